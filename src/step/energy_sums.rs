@@ -144,32 +144,11 @@ impl Totals {
         }
     }
 
-    /// Adds a node whose inertia in the step, over its square, is `stiffness` (N/m), not that of its mass, which gravity
-    /// acts on.
-    pub(crate) fn add_node(
-        &mut self,
-        step: &Step,
-        inertia: &NodeInertia,
-        stiffness: f32,
-        increment: &NodeVector,
-        force: &NodeVector,
-        next: &[f32; 4],
-    ) {
-        let mut square = 0.0;
-        for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
-            let mut sums = Sums::new(step, |value| value);
-            let free = if inverse > 0.0 { 1.0 } else { 0.0 };
-            sums.add(inertia.mass, free, increment.0[axis], force.0[axis], next[axis]);
-            let mean = 0.5 * free * (next[axis] + step.carry() * increment.0[axis]);
-            square += mean * mean;
-            self.momentum[axis] += f64::from(sums.momentum);
-            self.prescribed += f64::from(sums.prescribed);
-            for (most, moved) in self.farthest.iter_mut().zip([increment.0[axis], next[axis]]) {
-                *most = moved.abs().max(*most);
-            }
-        }
-        let seconds = f64::from(step.seconds());
-        self.kinetic += seconds * seconds * f64::from(stiffness) * f64::from(square);
+    /// Of nodes whose inertia in the step is not that of their masses: sums of inertia times the squares of their mean
+    /// increments (kg m^2), of masses times these (kg m), of force times the increments of held axes (N m), and the
+    /// largest components of the last and of the next increments, m.
+    pub(crate) fn of_sums(kinetic: f64, momentum: [f32; 3], prescribed: f32, farthest: [f32; 2]) -> Self {
+        Self { kinetic, momentum: momentum.map(f64::from), prescribed: prescribed.into(), work: 0.0, farthest }
     }
 
     /// Adds vectorised sums of nodes, one for each axis.

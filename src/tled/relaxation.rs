@@ -2,6 +2,8 @@
 
 use core::ops::Range;
 
+use glam::{BVec4A, Vec4};
+
 use crate::element::{ElementMaterial, LOOK_CYCLE, NoVisitor, NodeInertia};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -18,12 +20,12 @@ pub(super) fn go_back<M: ElementMaterial>(
     let StateView { displacement, remainder, increment, force, progress, .. } = state;
     let vectors = displacement.iter_mut().zip(remainder).zip(increment).zip(&*force);
     for (((((at, left), last), force), inertia), rate) in vectors.zip(scene.inertia).zip(rates) {
-        for axis in 0..3 {
-            let before = last.0[axis] - node.push * force.0[axis] / rate;
-            let back = if inertia.inverse[axis] > 0.0 { last.0[axis] + 0.5 * before } else { 0.0 };
-            [at.0[axis], left.0[axis]] = moved(at.0[axis], left.0[axis], -back);
-            last.0[axis] = 0.0;
-        }
+        let (here, rest) = (Vec4::from(at.0), Vec4::from(left.0));
+        let increment = Vec4::from(last.0);
+        let before = increment - node.push / rate * Vec4::from(force.0);
+        let back = Vec4::select(free_axes(inertia), increment + 0.5 * before, Vec4::ZERO);
+        [at.0, left.0] = moved(here, rest, -back).map(|vector| vector.to_array());
+        last.0 = [0.0; 4];
     }
     progress.dt = 0.0;
 }
@@ -36,15 +38,19 @@ pub(super) struct NodeMotion {
 }
 
 impl NodeMotion {
+    /// The next increment of a node; held axes stand still.
     #[inline(always)]
-    fn next(self, inertia: &NodeInertia, rate: f32, increment: &NodeVector, force: &NodeVector) -> [f32; 4] {
-        let (mut next, share) = ([0.0; 4], self.push / rate);
-        for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
-            let moved = increment.0[axis] + share * force.0[axis];
-            next[axis] = if inverse > 0.0 { moved } else { 0.0 };
-        }
-        next
+    fn next(self, inertia: &NodeInertia, rate: f32, increment: &NodeVector, force: &NodeVector) -> Vec4 {
+        let next = Vec4::from(increment.0) + self.push / rate * Vec4::from(force.0);
+        Vec4::select(free_axes(inertia), next, Vec4::ZERO)
     }
+}
+
+/// The axes along which a node moves.
+#[inline(always)]
+fn free_axes(inertia: &NodeInertia) -> BVec4A {
+    let [x, y, z] = inertia.inverse;
+    Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO)
 }
 
 /// One step.
@@ -71,15 +77,26 @@ impl<T> Relaxation<'_, T> {
         increment: &[NodeVector],
         force: &[NodeVector],
     ) -> Totals {
-        let mut totals = Totals::default();
-        let of_nodes = [increment.get(nodes.clone()).unwrap_or_default(), force];
-        let (inertia, rates) =
-            (inertia.get(nodes.clone()).unwrap_or_default(), self.rates.get(nodes).unwrap_or_default());
-        for (((inertia, rate), increment), force) in inertia.iter().zip(rates).zip(of_nodes[0]).zip(of_nodes[1]) {
+        let (increment, rates) =
+            (increment.get(nodes.clone()).unwrap_or_default(), self.rates.get(nodes.clone()).unwrap_or_default());
+        let nodes = inertia.get(nodes).unwrap_or_default().iter().zip(rates).zip(increment.iter().zip(force));
+        let [mut momentum, mut held, mut farthest, mut farthest_next] = [Vec4::ZERO; 4];
+        let mut kinetic = 0.0;
+        for ((inertia, rate), (increment, force)) in nodes {
             let next = self.node.next(inertia, *rate, increment, force);
-            totals.add_node(self.step, inertia, rate / self.node.push, increment, force, &next);
+            let (increment, force, free) = (Vec4::from(increment.0), Vec4::from(force.0), free_axes(inertia));
+            // A held axis has no inertia of its own: what moves it is counted as work.
+            let mean = 0.5 * (next + Vec4::select(free, increment, Vec4::ZERO));
+            let prescribed = Vec4::select(free, Vec4::ZERO, increment);
+            kinetic += rate / self.node.push * mean.length_squared();
+            momentum += inertia.mass * (mean + prescribed);
+            held += force * prescribed;
+            (farthest, farthest_next) = (farthest.max(increment.abs()), farthest_next.max(next.abs()));
         }
-        totals
+        let seconds = f64::from(self.step.seconds());
+        let farthest = [farthest, farthest_next].map(|most| most.truncate().max_element());
+        let held = held.x + held.y + held.z;
+        Totals::of_sums(seconds * seconds * f64::from(kinetic), momentum.truncate().to_array(), held, farthest)
     }
 }
 
@@ -120,7 +137,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
         increment: &NodeVector,
         force: &NodeVector,
     ) -> [f32; 4] {
-        self.rates.get(node).map_or([0.0; 4], |rate| self.node.next(inertia, *rate, increment, force))
+        self.rates.get(node).map_or([0.0; 4], |rate| self.node.next(inertia, *rate, increment, force).to_array())
     }
 
     fn needs_remainders(&self) -> Option<bool> {
@@ -152,10 +169,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
                 rows.zip(of_nodes).zip(rates.get(nodes).unwrap_or_default())
             {
                 let next = node.next(inertia, *rate, last, force);
-                for axis in 0..3 {
-                    [at.0[axis], left.0[axis]] = moved(at.0[axis], left.0[axis], next[axis]);
-                    last.0[axis] = next[axis];
-                }
+                let (here, rest) = (Vec4::from(at.0), Vec4::from(left.0));
+                [at.0, left.0] = moved(here, rest, next).map(|vector| vector.to_array());
+                last.0 = next.to_array();
             }
         });
     }
