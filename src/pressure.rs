@@ -214,6 +214,22 @@ impl<'a> Pressure<'a> {
         }
     }
 
+    /// The work of the forces at `time` (s) along these ways of the nodes (m), J.
+    pub(crate) fn work(&self, time: f64, displacement: &[NodeVector], way: impl Fn(usize) -> Option<[f32; 3]>) -> f64 {
+        let mut work = 0.0;
+        self.each(
+            time,
+            displacement,
+            |_| true,
+            |nodes, newton, _| {
+                for node in nodes {
+                    work += f64::from(newton.dot(Vec3::from(way(node as usize).unwrap_or_default())));
+                }
+            },
+        );
+        work
+    }
+
     /// Adds bounds of their stiffness at these displacements to those of the nodes, N/m: of the turning and growing of
     /// triangles with the longest edge `l` a third of `p l` at each corner, and of filling `B g g^T / V*`, with the sum
     /// of all areas for one of the two.

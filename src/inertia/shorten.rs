@@ -69,24 +69,12 @@ impl LargeView<'_, '_> {
             }
         }
         if let Some(pressure) = loads.pressure() {
-            pressure.each(
-                progress.time,
-                displacement,
-                |_| true,
-                |nodes, newton, _| {
-                    for node in nodes.map(|node| node as usize) {
-                        let (Some(NodeVector(last)), Some(inertia)) = (increment.get(node), scene.inertia.get(node))
-                        else {
-                            continue;
-                        };
-                        let next = next(node);
-                        for axis in (0..3).filter(|&axis| inertia.inverse[axis] > 0.0) {
-                            let way = 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
-                            work += f64::from(newton[axis] * way);
-                        }
-                    }
-                },
-            );
+            work += pressure.work(progress.time, displacement, |node| {
+                let (last, inertia) = (increment.get(node)?.0, scene.inertia.get(node)?);
+                let next = next(node);
+                let way = |axis: usize| 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
+                Some([0, 1, 2].map(|axis| if inertia.inverse[axis] > 0.0 { way(axis) } else { 0.0 }))
+            });
         }
         let nodes = increment.iter_mut().zip(scene.inertia).zip(&*force);
         for (node, ((NodeVector(last), inertia), force)) in nodes.enumerate() {

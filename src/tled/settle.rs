@@ -25,7 +25,7 @@ use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
 use crate::copy::copy;
-use crate::element::{ElementMaterial, Extremes};
+use crate::element::{ElementMaterial, Extremes, NodeInertia};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
@@ -141,24 +141,14 @@ pub fn settle_in_parts<M: ElementMaterial>(
     if !(metre.is_finite() && metre > 0.0) {
         return Err(SettleError::Metre { metre });
     }
-    let (nodes, capacity) = (scene.node_count(), storage.len());
-    let needed = vectors_to_settle(nodes);
-    if capacity < needed {
-        return Err(SettleError::Capacity { needed, capacity });
-    }
-    let (units, rest) = storage.split_at_mut(nodes.min(capacity));
-    let (begin, rates) = rest.split_at_mut(nodes.min(rest.len()));
+    let nodes = scene.node_count();
+    let (units, begin, rates) = split(scene.inertia, storage)?;
     let nothing = |status| Settled { at_rest: false, remaining: f32::INFINITY, steps: 0, status };
     let room = state.capacity_for(scene.element());
     // Seconds of a constant, which can be a step's.
     let (true, Ok(step)) = (room >= nodes && nodes > 0, Step::unchecked(SECONDS, 0.0)) else {
         return Ok(nothing(Status::Mismatch { nodes, room }));
     };
-    for (unit, inertia) in units.iter_mut().zip(scene.inertia) {
-        let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
-        unit.0 = [x, y, z, 1.0];
-    }
-    let rates = must_cast_slice_mut(rates).get_mut(..nodes).unwrap_or_default();
     let mut bounds = Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST };
     let is_finite = stop_in(scene, state.reborrow()) && {
         let first = loads.of_step(&state, SECONDS, STEPS_OF_SUPPORTS);
@@ -169,18 +159,15 @@ pub fn settle_in_parts<M: ElementMaterial>(
     }
     let time = state.progress.time;
     copy(begin, state.displacement);
-    let mut run = Run {
-        step,
-        bounds,
-        swing: Swing::first(nodes),
-        begin,
-        halvings: 0,
-        is_fine: false,
-        settled: nothing(Status::Ok),
-    };
+    let (swing, settled) = (Swing::first(nodes), nothing(Status::Ok));
+    let mut run = Run { step, bounds, swing, begin, halvings: 0, is_fine: false, settled };
     for taken in 0..most_steps.max(1) {
         let left = STEPS_OF_SUPPORTS.saturating_sub(taken).max(1);
         let of_step = loads.of_step(&state, SECONDS, left);
+        if left == 1 && taken == STEPS_OF_SUPPORTS && !of_step.motions().is_empty() {
+            // What swings before have told was of other supports.
+            (run.swing.told, run.settled.remaining) = (f32::INFINITY, f32::INFINITY);
+        }
         let goes_on = run.take(scene, &of_step, state.reborrow(), threads);
         if !goes_on || (left == 1 && run.settled.remaining < metre) {
             break;
@@ -191,6 +178,24 @@ pub fn settle_in_parts<M: ElementMaterial>(
     // It has been before.
     let _ = stop_in(scene, state);
     Ok(Settled { at_rest: settled.status.is_taken() && settled.remaining < metre, ..settled })
+}
+
+/// The parts of the storage: unit masses along free axes, where a swing began, bounds.
+type Parts<'a> = (&'a [NodeVector], &'a mut [NodeVector], &'a mut [f32]);
+
+fn split<'a>(inertia: &[NodeInertia], storage: &'a mut [NodeVector]) -> Result<Parts<'a>, SettleError> {
+    let (nodes, capacity) = (inertia.len(), storage.len());
+    let needed = vectors_to_settle(nodes);
+    if capacity < needed {
+        return Err(SettleError::Capacity { needed, capacity });
+    }
+    let (units, rest) = storage.split_at_mut(nodes.min(capacity));
+    let (begin, rates) = rest.split_at_mut(nodes.min(rest.len()));
+    for (unit, inertia) in units.iter_mut().zip(inertia) {
+        let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+        unit.0 = [x, y, z, 1.0];
+    }
+    Ok((units, begin, must_cast_slice_mut(rates).get_mut(..nodes).unwrap_or_default()))
 }
 
 /// Bounds of the stiffness at the nodes.
@@ -229,15 +234,14 @@ impl Bounds<'_> {
         found.is_some() && finite
     }
 
-    /// Whether they are to be looked at after one more step.
-    fn is_due(&mut self, now: &Extremes<f32>) -> bool {
+    /// After a step with these extremes: they are to be looked at sooner where elements are squeezed.
+    fn enter(&mut self, now: &Extremes<f32>) {
         self.left = self.left.saturating_sub(1);
         let squeezed = 1.0 + now.least_change < (1.0 - SQUEEZE) * (1.0 + self.extremes.least_change)
             || now.saturation > self.extremes.saturation + SQUEEZE;
         if squeezed {
-            self.between = 1;
+            (self.left, self.between) = (0, 1);
         }
-        self.left == 0 || squeezed
     }
 }
 
@@ -306,6 +310,12 @@ impl Run<'_> {
         threads: &impl Threads,
     ) -> bool {
         let Self { step, bounds, swing, settled, begin, is_fine, .. } = self;
+        // Not after the last step, whose forces stay.
+        if bounds.left == 0 && !bounds.look(scene, loads, state.reborrow()) {
+            let time = state.progress.time;
+            settled.status = Status::Diverged(Divergence { time, node: 0, cause: Cause::NotFinite });
+            return false;
+        }
         let first = if state.dt > 0.0 { 1.0 } else { 0.5 };
         let node = NodeMotion { push: 4.0 * first * bounds.share };
         let mut relax = Relaxation { step, node, rates: bounds.rates, threads, is_fine: *is_fine };
@@ -326,11 +336,7 @@ impl Run<'_> {
             copy(begin, state.displacement);
             *is_fine = settled.remaining < FINE * farthest(&[], state.displacement);
         }
-        let time = state.progress.time;
-        if bounds.is_due(&extremes) && !bounds.look(scene, loads, state) {
-            settled.status = Status::Diverged(Divergence { time, node: 0, cause: Cause::NotFinite });
-            return false;
-        }
+        bounds.enter(&extremes);
         true
     }
 
@@ -351,7 +357,7 @@ impl Run<'_> {
         // Half the step is a quarter of its square.
         self.bounds.share *= 0.25;
         self.bounds.between = 1;
-        (self.swing.steps, self.swing.kinetic) = (0, 0.0);
+        self.swing = Swing { steps: 0, kinetic: 0.0, told: f32::INFINITY, ..self.swing };
         copy(self.begin, state.displacement);
         self.bounds.look(scene, loads, state)
     }

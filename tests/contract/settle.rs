@@ -90,7 +90,19 @@ fn it_rests_where_a_damped_motion_ends_under_gravity_and_a_force() {
         };
         for (what, force, gravity) in [("gravity", [0.0; 3], GRAVITY), ("a force", [2e-3, 1e-3, 0.0], [0.0; 3])] {
             let reference = damped(&mut loaded(force, gravity), 4.0);
-            settled(&format!("{element:?}, {what}"), &mut loaded(force, gravity), &reference, TOLERANCE);
+            let mut resting = loaded(force, gravity);
+            settled(&format!("{element:?}, {what}"), &mut resting, &reference, TOLERANCE);
+            // The supports bear the load.
+            let (body, forces) = (body(), resting.state().forces());
+            let borne = held(&body).iter().fold([0.0; 3], |sum, &node| {
+                let force = forces[node as usize].to_array();
+                [0, 1, 2].map(|axis| sum[axis] + force[axis])
+            });
+            let mass = resting.scene().view().mass() as f32;
+            for axis in 0..3 {
+                let load = force[axis] + mass * gravity[axis];
+                assert!((borne[axis] - load).abs() < 0.01 * mass.max(1e-3), "{borne:?}");
+            }
         }
     }
 }
