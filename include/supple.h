@@ -50,6 +50,9 @@
 #define SUPPLE_STATE_SIZE(nodes, element) \
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
+#define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
+    (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
+#define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
     (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,    \
@@ -147,12 +150,17 @@
 /**
  * Bytes before the arrays of loads.
  */
-#define SUPPLE_LOADS_FRONT 64
+#define SUPPLE_LOADS_FRONT 128
 
 /**
  * Bytes before the arrays of a state.
  */
 #define SUPPLE_STATE_FRONT 192
+
+/**
+ * Bytes before the arrays of pressures.
+ */
+#define SUPPLE_PRESSURE_FRONT 64
 
 /**
  * Most parts of a step.
@@ -329,7 +337,8 @@ enum supple_status
     SUPPLE_INEXACT = 4,
     /**
      * The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
-     * how much time is missing, and its estimate whether the steps were exact enough.
+     * how much time is missing, and its estimate whether the steps were exact enough. Of supple_settle: the body is not
+     * at rest yet, and the report tells how far it is from it.
      */
     SUPPLE_BEHIND = 5,
     /**
@@ -574,6 +583,11 @@ enum supple_status
      * The step was not taken: learned steps do not know pulls.
      */
     SUPPLE_E_NO_PULLS = -96,
+    /**
+     * The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
+     * around it (limit: its size, m).
+     */
+    SUPPLE_E_DIVERGED_PRESSURE = -98,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -615,6 +629,11 @@ typedef struct supple_learned supple_learned;
  * What acts on a scene. One thread at a time; a call that takes steps changes it as well.
  */
 typedef struct supple_loads supple_loads;
+
+/**
+ * Pressures on surfaces of a body, which follow them as they move. One thread at a time. It may be copied with memcpy.
+ */
+typedef struct supple_pressure supple_pressure;
 
 /**
  * Pulls of a scene, with their targets. They belong to one state. One thread at a time; a call that takes steps changes
@@ -1596,6 +1615,24 @@ typedef struct {
 } supple_sim_report;
 
 /**
+ * What supple_settle came to.
+ */
+typedef struct {
+    /**
+     * The estimate of the largest distance of a node from where it rests, m; infinite before the body has swung once.
+     */
+    float remaining;
+    /**
+     * Steps that were computed.
+     */
+    uint32_t steps;
+    /**
+     * What stopped the call; status SUPPLE_OK if nothing did.
+     */
+    supple_error error;
+} supple_settled;
+
+/**
  * What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
  */
 typedef struct {
@@ -1830,6 +1867,78 @@ supple_status supple_set_step(const supple_scene *scene,
  * Writes the simulated time, s, and how many steps have been taken; either may be NULL.
  */
 supple_status supple_state_time(const supple_state *state, double *seconds, uint64_t *steps);
+
+/**
+ * Bytes of memory that pressures on so many triangles and surfaces need. SUPPLE_PRESSURE_SIZE is the same as a
+ * constant.
+ */
+size_t supple_pressure_size(uint32_t triangles,
+                            uint32_t surfaces);
+
+/**
+ * Prepares pressures, zero yet, in `memory` of at least supple_pressure_size bytes, aligned to SUPPLE_ALIGN.
+ *
+ * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param triangles three nodes of each of `count` triangles, as of supple_boundary: seen from outside of the tissue
+ * counter-clockwise.
+ * @param surface_of the surface of each triangle, from zero; NULL: all are of surface 0.
+ * @param surfaces how many there are, each with a pressure of its own.
+ * @param error may be NULL; index is that of a triangle.
+ */
+supple_status supple_pressure_init(void *memory,
+                                   size_t bytes,
+                                   const supple_scene *scene,
+                                   const float *points,
+                                   const uint32_t *triangles,
+                                   const uint32_t *surface_of,
+                                   uint32_t count,
+                                   uint32_t surfaces,
+                                   supple_pressure **pressure,
+                                   supple_error *error);
+
+/**
+ * Sets the pressure on a surface, between two calls as you like.
+ *
+ * @param pascal Pa: positive where it presses the tissue, from outside or from within a cavity.
+ * @param ramp seconds from the start of the simulation over which it grows to that, zero or more.
+ */
+supple_status supple_pressure_set(supple_pressure *pressure,
+                                  uint32_t surface,
+                                  float pascal,
+                                  float ramp);
+
+/**
+ * Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
+ * within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
+ * the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps.
+ *
+ * @param cubic_metres m^3, above zero.
+ * @param bulk Pa; 0: the volume is not asked for.
+ */
+supple_status supple_pressure_fill(supple_pressure *pressure,
+                                   uint32_t surface,
+                                   float cubic_metres,
+                                   float bulk);
+
+/**
+ * Lets pressures act where these loads do, as long as both are there; NULL: none do. A copy of the loads has the same
+ * pressures.
+ */
+supple_status supple_set_pressure(supple_loads *loads,
+                                  const supple_pressure *pressure);
+
+/**
+ * Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
+ * on it at its time, with what fills it.
+ *
+ * @param cubic_metres may be NULL; receives the volume, m^3.
+ * @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
+ */
+supple_status supple_pressure_now(const supple_pressure *pressure,
+                                  const supple_state *state,
+                                  uint32_t surface,
+                                  double *cubic_metres,
+                                  float *pascal);
 
 /**
  * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as
@@ -2539,6 +2648,69 @@ supple_status supple_sim_advance(supple_sim *sim,
                                  double seconds,
                                  const supple_threads *threads,
                                  supple_sim_report *report);
+
+/**
+ * Bytes of memory that supple_settle needs for a scene of so many nodes. SUPPLE_SETTLE_SIZE is the same as a constant.
+ */
+size_t supple_settle_size(uint32_t nodes);
+
+/**
+ * Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
+ * Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
+ * go to where they are asked for. Velocities are zero afterwards, and the energy balance begins with the strain energy.
+ * Steps of every kind go on from there; a guard begins anew.
+ *
+ * SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
+ * tells how much is missing, and another call goes on from there. Where a step is refused the status says why, and the
+ * state is that before it.
+ *
+ * @param metre m, above zero.
+ * @param most_steps at least one is taken; each takes about as long as an exact one.
+ * @param threads NULL: the calling thread alone.
+ * @param memory at least supple_settle_size bytes, aligned to SUPPLE_ALIGN, for the call alone.
+ * @param settled may be NULL; is written whatever the status.
+ */
+supple_status supple_settle(const supple_scene *scene,
+                            supple_loads *loads,
+                            supple_state *state,
+                            float metre,
+                            uint32_t most_steps,
+                            const supple_threads *threads,
+                            void *memory,
+                            size_t bytes,
+                            supple_settled *settled);
+
+/**
+ * The same of a simulation, under its loads and instruments: see supple_settle.
+ *
+ * @param metre m, above zero.
+ * @param most_steps at least one is taken; each takes about as long as an exact one.
+ * @param threads NULL: the calling thread alone.
+ * @param memory at least supple_settle_size bytes, aligned to SUPPLE_ALIGN, for the call alone.
+ * @param settled may be NULL; is written whatever the status.
+ */
+supple_status supple_sim_settle(supple_sim *sim,
+                                float metre,
+                                uint32_t most_steps,
+                                const supple_threads *threads,
+                                void *memory,
+                                size_t bytes,
+                                supple_settled *settled);
+
+/**
+ * Puts the nodes at displacements of yours, at a stop: velocities are zero, time stays, and the energy balance begins
+ * with the strain energy. It counts as a step. Fixed nodes keep what is given, moved ones until a motion moves them. Of
+ * a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
+ *
+ * @param displacements three components of each of `nodes` nodes, m, from rest.
+ * @param nodes must be that of the scene.
+ * @param error may be NULL; index and node are those of a displacement that is not finite. Nothing has changed then.
+ */
+supple_status supple_set_displacements(const supple_scene *scene,
+                                       supple_state *state,
+                                       const float *displacements,
+                                       uint32_t nodes,
+                                       supple_error *error);
 
 /**
  * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called

@@ -29,6 +29,7 @@ using force = supple_force;
 using motion = supple_motion;
 using threads = supple_threads;
 using report = supple_report;
+using settled = supple_settled;
 using scene_facts = supple_scene_facts;
 using learned_facts = supple_learned_facts;
 using estimate = supple_estimate;
@@ -131,6 +132,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_instrument = SUPPLE_E_DIVERGED_INSTRUMENT,
     e_no_contact = SUPPLE_E_NO_CONTACT,
     e_no_pulls = SUPPLE_E_NO_PULLS,
+    e_diverged_pressure = SUPPLE_E_DIVERGED_PRESSURE,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -255,7 +257,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_grid): case of(s::e_diverged):
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
     case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
-    case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): return true;
+    case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): case of(s::e_diverged_pressure): return true;
     }
     return false;
 }
@@ -299,6 +301,7 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_damping: return {"entry", " 1/s", true, true};
     case status::e_diverged_energy: return {"entry", " J", true, true};
     case status::e_diverged_force: return {"force", "", true, true};
+    case status::e_diverged_pressure: return {"surface", "", true, true};
     case status::e_diverged_motion: return {"entry", " m", true, true};
     case status::e_diverged_instrument: return {"instrument", " m", true, true};
     case status::e_instrument: return {"instrument", "", true, false};
@@ -452,6 +455,8 @@ private:
 class contact;
 class pulls;
 
+class pressure;
+
 // What acts on a scene. One thread at a time.
 class loads {
 public:
@@ -492,6 +497,9 @@ public:
         const auto count = static_cast<std::uint32_t>(all.size());
         return detail::of(supple_set_motions(raw_, of.raw(), all.data(), count, why));
     }
+
+    // Lets pressures act where these loads do; a pressure() ends that.
+    status set_pressure(const pressure &with) const noexcept;
 
     // Lets the instruments of a contact touch what these loads act on; a contact() ends that.
     status set_contact(const contact &with) const noexcept;
@@ -560,6 +568,20 @@ public:
 
     // Stops all motion: to go on from a state with more energy than loads and supports gave.
     status stop(const scene &of) const noexcept { return detail::of(supple_state_stop(of.raw(), raw_)); }
+
+    // Puts the nodes at these displacements, m, three components each, at a stop.
+    status set_displacements(scene of, span<const float> displacements, error *why = nullptr) const noexcept {
+        const std::size_t nodes = displacements.size() / 3;
+        return detail::of(supple_set_displacements(of.raw(), raw_, displacements.data(),
+                                                   static_cast<std::uint32_t>(nodes < none ? nodes : none), why));
+    }
+
+    // Brings the body to rest to within so many metres, in at most so many steps; `room` of supple_settle_size bytes.
+    status settle(scene of, loads acting, float metre, std::uint32_t most_steps, memory room, settled *out = nullptr,
+                  const threads *on = nullptr) const noexcept {
+        return detail::of(
+            supple_settle(of.raw(), acting.raw(), raw_, metre, most_steps, on, room.data(), room.size(), out));
+    }
 
     // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
@@ -896,6 +918,71 @@ inline result<std::size_t> boundary(span<const std::uint32_t> tetrahedra, span<s
     return count;
 }
 
+// Pressures that follow the surface of a body. One thread at a time.
+class pressure {
+public:
+    // None.
+    constexpr pressure() noexcept = default;
+    constexpr explicit pressure(supple_pressure *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_pressure *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that some on so many triangles and surfaces need.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t triangles, std::uint32_t surfaces = 1) noexcept {
+        return SUPPLE_PRESSURE_SIZE(triangles, surfaces);
+    }
+
+    // Prepares them, zero yet, on triangles as of boundary(), all of one surface or each of its own in `surface_of`.
+    static result<pressure> make(memory place, scene of, span<const float> points, span<const std::uint32_t> triangles,
+                                 span<const std::uint32_t> surface_of = {}, std::uint32_t surfaces = 1) noexcept {
+        result<pressure> made{};
+        const std::size_t count = triangles.size() / 3;
+        const bool fits = points.size() / 3 >= of.describe().value.nodes && count < none &&
+                          (surface_of.size() == 0 || surface_of.size() >= count);
+        if (!fits) {
+            made.status = status::e_short;
+            made.error = detail::nothing(made.status);
+            return made;
+        }
+        made.status = detail::of(supple_pressure_init(place.data(), place.size(), of.raw(), points.data(), triangles.data(),
+                                                      surface_of.data(), static_cast<std::uint32_t>(count), surfaces,
+                                                      &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Sets the pressure on a surface, Pa: positive where it presses the tissue.
+    status set(float pascal, float ramp = 0.0f, std::uint32_t surface = 0) const noexcept {
+        return detail::of(supple_pressure_set(raw_, surface, pascal, ramp));
+    }
+
+    // Asks for the volume within a closed surface, m^3, with a stiffness, Pa; of zero: no more.
+    status fill(float cubic_metres, float bulk, std::uint32_t surface = 0) const noexcept {
+        return detail::of(supple_pressure_fill(raw_, surface, cubic_metres, bulk));
+    }
+
+    // Volume within a closed surface, m^3.
+    [[nodiscard]] result<double> volume(state at, std::uint32_t surface = 0) const noexcept {
+        result<double> found{};
+        found.status = detail::of(supple_pressure_now(raw_, at.raw(), surface, &found.value, nullptr));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+    // The pressure on a surface with what fills it, Pa.
+    [[nodiscard]] result<float> now(state at, std::uint32_t surface = 0) const noexcept {
+        result<float> found{};
+        found.status = detail::of(supple_pressure_now(raw_, at.raw(), surface, nullptr, &found.value));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+private:
+    supple_pressure *raw_ = nullptr;
+};
+
+inline status loads::set_pressure(const pressure &with) const noexcept {
+    return detail::of(supple_set_pressure(raw_, with.raw()));
+}
+
 // The forces of a uniform traction, Pa, on triangles of the boundary of a body of these points, for loads::set_forces: three for each.
 inline result<std::size_t> traction(span<const float> points, span<const std::uint32_t> triangles, const std::array<float, 3> &pascal,
                                     float ramp, span<force> out) noexcept {
@@ -1221,6 +1308,13 @@ public:
     // Moves on by so many seconds, usually a frame.
     status advance(double seconds, sim_report *out = nullptr, const threads *on = nullptr) const noexcept {
         return detail::of(supple_sim_advance(raw_, seconds, on, out));
+    }
+
+    // Brings the body to rest to within so many metres, in at most so many steps, under its loads and instruments; `room` of
+    // supple_settle_size bytes.
+    status settle(float metre, std::uint32_t most_steps, memory room, settled *out = nullptr,
+                  const threads *on = nullptr) const noexcept {
+        return detail::of(supple_sim_settle(raw_, metre, most_steps, on, room.data(), room.size(), out));
     }
 
     // Its objects; of none if it is no simulation.

@@ -93,6 +93,7 @@
 //! | [`pulls`] | forces that draw points of the tissue to targets; supports that give way |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion, instruments |
+//! | [`pressure`] | pressure that follows the surface |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`plausibility`] | does a scene look as if a unit was mistaken |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
@@ -151,6 +152,7 @@ pub mod mlp;
 mod padding;
 pub mod plausibility;
 pub mod points;
+pub mod pressure;
 pub mod pulls;
 pub mod reaction;
 /// Of the tests, in float64.

@@ -1,5 +1,6 @@
 //! What acts on a scene, set by the host whenever it likes: nodal forces (N), traction on boundary
-//! triangles (Pa, turned into nodal forces on the shape at rest), gravity (m/s^2), prescribed motion (m).
+//! triangles (Pa, turned into nodal forces on the shape at rest), pressure that follows the surface (Pa,
+//! [`crate::pressure`]), gravity (m/s^2), prescribed motion (m).
 //! A ramp of `r` seconds multiplies a load by `min(1, t / r)`; `r = 0` is a sudden load. In the step from
 //! `t_n` to `t_(n+1)` forces are taken at `t_n`, prescribed positions at `t_(n+1)`.
 
@@ -10,6 +11,7 @@ use glam::{Vec3, Vec4};
 use crate::contact::{Contact, Surface, kept_pushes};
 use crate::element::Axes;
 use crate::padding;
+use crate::pressure::Pressure;
 use crate::pulls::Pulls;
 use crate::scene::AsScene;
 use crate::simd::NodeVector;
@@ -63,7 +65,7 @@ impl Motion {
 pub enum LoadError {
     /// A load names a node that is not there.
     Node {
-        /// "force", "motion" or "triangle".
+        /// "force", "motion", "triangle" or "pressure triangle".
         kind: &'static str,
         /// Position in its list.
         index: usize,
@@ -74,7 +76,7 @@ pub enum LoadError {
     },
     /// A component is NaN or infinite.
     NotFinite {
-        /// "force", "motion", "traction" or "gravity".
+        /// "force", "motion", "traction", "gravity", "pressure" or "pressure triangle".
         kind: &'static str,
         /// Position in its list.
         index: usize,
@@ -83,12 +85,30 @@ pub enum LoadError {
     },
     /// A ramp is negative or not finite.
     Ramp {
-        /// "force", "motion" or "traction".
+        /// "force", "motion", "traction" or "pressure".
         kind: &'static str,
         /// Position in its list.
         index: usize,
         /// The ramp, s.
         value: f32,
+    },
+    /// A volume that is to be filled cannot be.
+    Filling {
+        /// Position in the list of surfaces.
+        index: usize,
+        /// The volume, m^3, which must be above zero.
+        volume: f32,
+        /// The stiffness, Pa, which must be zero or more.
+        bulk: f32,
+    },
+    /// A triangle is of a surface that has no pressure.
+    Surface {
+        /// Position in the list of triangles.
+        index: usize,
+        /// The surface it names.
+        surface: u32,
+        /// Surfaces with a pressure.
+        surfaces: usize,
     },
     /// A motion moves an axis that has no support which moves.
     NotHeld {
@@ -113,6 +133,13 @@ impl fmt::Display for LoadError {
             Self::Ramp { kind, index, value } => {
                 write!(f, "{kind} {index}: the ramp is {value} s, it must be zero or more")
             }
+            Self::Filling { index, volume, bulk } => write!(
+                f,
+                "pressure {index}: filling to {volume} m^3 with {bulk} Pa; the volume must be positive, the stiffness zero or more"
+            ),
+            Self::Surface { index, surface, surfaces } => {
+                write!(f, "pressure triangle {index}: surface {surface} does not exist, there are {surfaces}")
+            }
             Self::NotHeld { index, node, axis } => {
                 let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
                 write!(f, "motion {index}: node {node} has no support that moves along {axis}")
@@ -130,6 +157,7 @@ pub struct Loads<'a> {
     forces: &'a [NodalForce],
     motions: &'a [Motion],
     contact: Option<Contact<'a>>,
+    pressure: Option<Pressure<'a>>,
     /// Pushes of instruments that another run has found, N, and a factor.
     given: Option<(Surface<'a>, &'a [NodeVector], f32)>,
     pulls: Option<Pulls<'a>>,
@@ -196,8 +224,16 @@ impl LoadsOverTime for LoadsOfCall<'_> {
 
 impl<'a> Loads<'a> {
     /// No load; supports stand still.
-    pub const NONE: Self =
-        Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, given: None, pulls: None, nodes: None };
+    pub const NONE: Self = Self {
+        gravity: [0.0; 3],
+        forces: &[],
+        motions: &[],
+        contact: None,
+        pressure: None,
+        given: None,
+        pulls: None,
+        nodes: None,
+    };
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
@@ -237,6 +273,18 @@ impl<'a> Loads<'a> {
     #[must_use]
     pub const fn pulled_by(self, pulls: Pulls<'a>) -> Self {
         Self { pulls: Some(pulls), ..self }
+    }
+
+    /// The same loads and pressures that follow the surface.
+    #[must_use]
+    pub const fn pressed_by(self, pressure: Pressure<'a>) -> Self {
+        Self { pressure: Some(pressure), ..self }
+    }
+
+    /// Pressures that follow the surface.
+    #[must_use]
+    pub const fn pressure(&self) -> Option<&Pressure<'a>> {
+        self.pressure.as_ref()
     }
 
     /// Loads with so many times the pushes that the instruments exert in the latest step of a state in place of the

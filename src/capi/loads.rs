@@ -9,6 +9,7 @@ use crate::state::StateView;
 
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
+use super::pressure::{self, supple_pressure};
 use super::pulls::{CallPulls, supple_pulls};
 use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
@@ -55,12 +56,13 @@ pub struct supple_loads {
     gravity: [f32; 3],
     contact: *mut supple_contact,
     pulls: *mut supple_pulls,
+    pressure: *const supple_pressure,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_loads {
     const MAGIC: [u8; 8] = magic(b'L');
-    const FRONT: usize = 64;
+    const FRONT: usize = 128;
 }
 
 impl supple_loads {
@@ -70,6 +72,10 @@ impl supple_loads {
 
     pub(super) const fn contact(&self) -> *mut supple_contact {
         self.contact
+    }
+
+    pub(super) const fn set_pressure(&mut self, pressure: *const supple_pressure) {
+        self.pressure = pressure;
     }
 
     pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
@@ -82,7 +88,7 @@ impl supple_loads {
 }
 
 /// Bytes before the arrays of loads.
-pub const SUPPLE_LOADS_FRONT: usize = 64;
+pub const SUPPLE_LOADS_FRONT: usize = 128;
 const _: () = assert!(SUPPLE_LOADS_FRONT == <supple_loads as Object>::FRONT);
 
 fn layout(forces: u32, motions: u32) -> Layout {
@@ -126,6 +132,7 @@ pub unsafe extern "C" fn supple_loads_init(
             gravity: [0.0; 3],
             contact: ptr::null_mut(),
             pulls: ptr::null_mut(),
+            pressure: ptr::null(),
         }));
         Ok(SUPPLE_OK)
     };
@@ -275,7 +282,11 @@ impl<'a> CallLoads<'a> {
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let contact = CallContact::of(object.contact, nodes)?;
             let pulls = CallPulls::of(object.pulls)?;
-            let loads = Loads::unchecked(object.gravity, forces, asked, nodes);
+            let mut loads = Loads::unchecked(object.gravity, forces, asked, nodes);
+            if !object.pressure.is_null() {
+                scene.fits(memory::read(object.pressure)?.nodes())?;
+                loads = loads.pressed_by(pressure::opened(object.pressure)?);
+            }
             #[cfg(feature = "contact")]
             let loads = match &contact {
                 Some(contact) if contact.has_instruments() => loads.touched_by(contact.contact),

@@ -28,6 +28,8 @@ mod traction;
 
 mod state;
 
+mod pressure;
+
 mod step;
 
 mod pool;
@@ -58,6 +60,8 @@ mod adaptive;
 mod reaction;
 
 mod simulation;
+
+mod settle;
 
 mod remarks;
 

@@ -164,6 +164,18 @@ pub struct supple_sim_objects {
     pub bytes: usize,
 }
 
+impl supple_sim_objects {
+    /// None yet.
+    pub(super) const NONE: Self = Self {
+        scene: ptr::null(),
+        state: ptr::null_mut(),
+        loads: ptr::null_mut(),
+        contact: ptr::null_mut(),
+        learned: ptr::null(),
+        bytes: 0,
+    };
+}
+
 /// What a call of supple_sim_advance came to.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]

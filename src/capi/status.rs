@@ -37,7 +37,8 @@ pub enum supple_status {
     /// A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
     SUPPLE_INEXACT = 4,
     /// The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
-    /// how much time is missing, and its estimate whether the steps were exact enough.
+    /// how much time is missing, and its estimate whether the steps were exact enough. Of supple_settle: the body is not
+    /// at rest yet, and the report tells how far it is from it.
     SUPPLE_BEHIND = 5,
 
     /// A pointer that must not be NULL is.
@@ -174,6 +175,9 @@ pub enum supple_status {
     SUPPLE_E_NO_CONTACT = -95,
     /// The step was not taken: learned steps do not know pulls.
     SUPPLE_E_NO_PULLS = -96,
+    /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
+    /// around it (limit: its size, m).
+    SUPPLE_E_DIVERGED_PRESSURE = -98,
 }
 
 use supple_status::*;
@@ -296,6 +300,12 @@ impl From<LoadError> for supple_error {
             }
             LoadError::NotFinite { index, value, .. } => is(SUPPLE_E_NOT_FINITE).at(index).value(value.into(), 0.0),
             LoadError::Ramp { index, value, .. } => is(SUPPLE_E_NEGATIVE).at(index).value(value.into(), 0.0),
+            LoadError::Filling { index, volume, bulk } => {
+                is(SUPPLE_E_NEGATIVE).at(index).value(if bulk < 0.0 { bulk } else { volume }.into(), 0.0)
+            }
+            LoadError::Surface { index, surface, surfaces } => {
+                is(SUPPLE_E_CAPACITY).at(index).value(surface.into(), surfaces as f64)
+            }
             LoadError::NotHeld { index, node, axis } => is(SUPPLE_E_NOT_HELD).at(index).node(node).axis(axis),
         }
     }
@@ -460,6 +470,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -92 => c"the step was not taken: a force would move its node through the tissue around it",
         -93 => c"the step was not taken: supports moved a node too far in one step",
         -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body: slower, shorter steps, or start outside",
+        -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
         _ => return None,

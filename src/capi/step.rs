@@ -139,6 +139,9 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
             Cause::Force { index, newton, size } => {
                 supple_error::from(SUPPLE_E_DIVERGED_FORCE).at(index).node(node).value(newton.into(), size.into())
             }
+            Cause::Pressure { surface, pascal, size } => {
+                supple_error::from(SUPPLE_E_DIVERGED_PRESSURE).at(surface).node(node).value(pascal.into(), size.into())
+            }
             Cause::Motion { metre, size } => {
                 supple_error::from(SUPPLE_E_DIVERGED_MOTION).node(node).value(metre.into(), size.into())
             }

@@ -50,7 +50,7 @@ impl LargeView<'_, '_> {
             method.storage.tables.next_increment.get(rank).copied().unwrap_or_default().0
         };
         let all_finite = (0..nodes).all(|node| next(node).iter().take(3).all(|value| value.is_finite()));
-        let Trial { scene, loads, increment, force, progress, .. } = trial;
+        let Trial { scene, loads, displacement, increment, force, progress, .. } = trial;
         let (mut work, gravity) = (0.0, loads.gravity());
         let shortened = |last: f32, next: f32, free: bool| {
             let gain = if all_finite && free { 0.5 * (next - last) } else { 0.0 };
@@ -67,6 +67,14 @@ impl LargeView<'_, '_> {
                 let way = 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
                 work += f64::from(factor * load.newton[axis] * way);
             }
+        }
+        if let Some(pressure) = loads.pressure() {
+            work += pressure.work(progress.time, displacement, |node| {
+                let (last, inertia) = (increment.get(node)?.0, scene.inertia.get(node)?);
+                let next = next(node);
+                let way = |axis: usize| 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
+                Some([0, 1, 2].map(|axis| if inertia.inverse[axis] > 0.0 { way(axis) } else { 0.0 }))
+            });
         }
         let nodes = increment.iter_mut().zip(scene.inertia).zip(&*force);
         for (node, ((NodeVector(last), inertia), force)) in nodes.enumerate() {

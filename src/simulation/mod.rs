@@ -20,6 +20,8 @@ mod mover;
 #[cfg(feature = "std")]
 mod owned;
 mod report;
+#[cfg(feature = "std")]
+mod settle;
 
 pub use clock::Clock;
 pub use mover::{Event, ExactSteps, Lead, Mover, StepKind};

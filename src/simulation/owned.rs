@@ -17,12 +17,13 @@ use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalFo
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
 use crate::points::{PointError, VecPoints};
+use crate::pressure::VecPressure;
 use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
 use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads};
-use crate::tled::{self, Pace, vectors_for_pace};
+use crate::tled::{self, DisplacementError, Pace, SettleError, vectors_for_pace};
 
 /// A scene in motion. Loads and instruments are set between two calls of [`Simulation::advance`] as the host likes.
 #[derive(Debug)]
@@ -33,6 +34,8 @@ pub struct Simulation<'w> {
     pub forces: Vec<NodalForce>,
     /// Where moved supports go, m.
     pub motions: Vec<Motion>,
+    /// Pressures that follow the surface, Pa.
+    pub pressures: VecPressure,
     /// Rigid bodies that touch the tissue, after [`Simulation::meeting`].
     pub instruments: Vec<Instrument<'w>>,
     /// What draws points of the tissue to targets ([`Simulation::pull`]).
@@ -43,13 +46,16 @@ pub struct Simulation<'w> {
     scene: VecScene<VecMaterial>,
     state: VecState,
     settings: Settings<'w>,
-    touchable: (Vec<SurfaceNode>, Vec<[u32; 3]>),
+    touchable: Touchable,
     /// Room for where motions are in the next step.
     in_step: Vec<Motion>,
     /// None until the first call.
     prepared: Option<Prepared<'w>>,
     clock: Clock,
 }
+
+/// Nodes and triangles that instruments can touch.
+type Touchable = (Vec<SurfaceNode>, Vec<[u32; 3]>);
 
 /// Steps of a method with their storage.
 #[derive(Debug)]
@@ -97,6 +103,7 @@ impl<'w> Simulation<'w> {
             gravity: [0.0; 3],
             forces: vec![],
             motions: vec![],
+            pressures: VecPressure::default(),
             instruments: vec![],
             pulls: vec![],
             pulled: vec![],
@@ -182,16 +189,11 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, pulls, pulled, scene, state, touchable, in_step, .. } = self;
-        let Self { settings, clock, .. } = self;
-        let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
-        if !instruments.is_empty() {
-            loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
-        }
-        if !pulls.is_empty() {
-            state.make_room_for_pulls(pulls.len());
-            loads = loads.pulled_by(Pulls::new(scene.node_count(), pulled, pulls)?);
-        }
+        let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, settings, .. } = self;
+        let (touchable, in_step, clock) = (&self.touchable, &mut self.in_step, &mut self.clock);
+        let others = (&*pressures, &**instruments, touchable, (&**pulled, &**pulls));
+        let loads = checked_loads(scene, *gravity, (forces, motions), others)?;
+        state.make_room_for_pulls(pulls.len());
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
         let end = clock.end_of_call(state.time(), seconds);
@@ -224,6 +226,24 @@ impl<'w> Simulation<'w> {
         let mover = prepared.mover();
         let watch = &mut |event: Event<'_>| watch(event);
         Ok(mover.advance(until, scene.view(), &mut loads, state.view(), work, &CallingThread, watch)?)
+    }
+
+    /// The loads of a call, and what they act on.
+    pub(super) fn acting(
+        &mut self,
+    ) -> Result<(LoadsOfCall<'_>, &VecScene<VecMaterial>, &mut VecState), SimulationError> {
+        let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, touchable, .. } =
+            self;
+        let (others, in_step) = ((&*pressures, &**instruments, &*touchable, (&**pulled, &**pulls)), &mut self.in_step);
+        let loads = checked_loads(scene, *gravity, (forces, motions), others)?;
+        state.make_room_for_pulls(pulls.len());
+        in_step.resize(motions.len(), Motion::default());
+        Ok((LoadsOfCall::new(loads, in_step), scene, state))
+    }
+
+    /// The next call prepares the steps anew, from the state as it is.
+    pub(super) fn forget_steps(&mut self) {
+        self.prepared = None;
     }
 
     fn prepare_once(&mut self) -> Result<(), SimulationError> {
@@ -383,10 +403,27 @@ impl<'w> Prepared<'w> {
     }
 }
 
-fn surface<'a>(
-    (nodes, triangles): &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
-    scene_nodes: usize,
-) -> Result<Surface<'a>, ContactError> {
+/// Pressures, instruments with what they touch, pulls with their nodes.
+type Others<'a> = (&'a VecPressure, &'a [Instrument<'a>], &'a Touchable, (&'a [PulledNode], &'a [Pull]));
+
+fn checked_loads<'a>(
+    scene: &VecScene<VecMaterial>,
+    gravity: [f32; 3],
+    (forces, motions): (&'a [NodalForce], &'a [Motion]),
+    (pressures, instruments, touchable, (pulled, pulls)): Others<'a>,
+) -> Result<Loads<'a>, SimulationError> {
+    let nodes = scene.node_count();
+    let mut loads = pressures.on(scene, Loads::new(scene, gravity, forces, motions)?)?;
+    if !instruments.is_empty() {
+        loads = loads.touched_by(Contact::new(surface(touchable, nodes)?, instruments)?);
+    }
+    if !pulls.is_empty() {
+        loads = loads.pulled_by(Pulls::new(nodes, pulled, pulls)?);
+    }
+    Ok(loads)
+}
+
+fn surface<'a>((nodes, triangles): &'a Touchable, scene_nodes: usize) -> Result<Surface<'a>, ContactError> {
     Surface::new(nodes, scene_nodes)?.with_triangles(triangles)
 }
 
@@ -412,6 +449,10 @@ pub enum SimulationError {
     Inertia(InertiaError),
     /// A network cannot move the scene.
     Learned(LearnedError),
+    /// The body cannot be brought to rest as asked for.
+    Settling(SettleError),
+    /// Displacements cannot be.
+    Displacement(DisplacementError),
     /// The stiffness of some element is not a finite number.
     NotFinite,
     /// A span (s) that cannot be.
@@ -432,6 +473,8 @@ impl fmt::Display for SimulationError {
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Learned(error) => error.fmt(f),
+            Self::Settling(error) => error.fmt(f),
+            Self::Displacement(error) => error.fmt(f),
             Self::NotFinite => f.write_str("the stiffness of some element is not a finite number"),
             Self::Seconds(seconds) => write!(f, "advance by {seconds} s: it must be a positive number"),
             Self::Refused(divergence) => divergence.fmt(f),
@@ -462,5 +505,7 @@ from! {
     Step: StepError,
     Inertia: InertiaError,
     Learned: LearnedError,
+    Settling: SettleError,
+    Displacement: DisplacementError,
     Refused: Divergence,
 }

@@ -31,6 +31,15 @@ pub enum Cause {
         /// Size of the node's own tissue: the edge of a cube of its volume, m.
         size: f32,
     },
+    /// A pressure moves the node through the tissue around it in this step.
+    Pressure {
+        /// Its surface.
+        surface: usize,
+        /// Pa.
+        pascal: f32,
+        /// As above, m.
+        size: f32,
+    },
     /// An instrument moves farther in this step than it is thick, or is so far inside the body that it throws the node.
     Instrument {
         /// Its place in the list of instruments.
@@ -78,6 +87,12 @@ impl fmt::Display for Divergence {
                  which is {:.3} mm across",
                 1e3 * size
             ),
+            Cause::Pressure { surface, pascal, size } => write!(
+                f,
+                "diverged at {time:.6} s at node {node}: the pressure on surface {surface}, of {pascal:.3e} Pa, moves it in one step \
+                 through its tissue, which is {:.3} mm across",
+                1e3 * size
+            ),
             Cause::Instrument { index, metre, most } => write!(
                 f,
                 "diverged at {time:.6} s at node {node}: instrument {index} moves by {:.3} mm in one step, or is as far inside the body; \
@@ -115,7 +130,7 @@ fn length(vector: [f32; 3]) -> f64 {
 impl<M: ElementMaterial> Trial<'_, M> {
     /// The node and the load that are to blame for a refused step, or the node and cause that the step itself tells.
     pub(super) fn blamed(&self, step: &Step, method: &impl StepMethod<M>, cause: Cause) -> (u32, Cause) {
-        let load = self.jumping_support().or_else(|| self.excessive_force(step, method.added_inertia()));
+        let load = self.jumping_support().or_else(|| self.excessive_force(step, method));
         load.unwrap_or_else(|| (self.culprit(step, method), cause))
     }
 
@@ -132,7 +147,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             Some(square * square * square > volume * volume)
         };
         let torn = self.loads.forces().iter().any(|load| tears(load.node as usize) == Some(true));
-        if torn { self.excessive_force(step, method.added_inertia()) } else { None }
+        if torn { self.excessive_force(step, method) } else { None }
     }
 
     /// The node that supports moved farthest in the step before, if that is a cause.
@@ -153,17 +168,22 @@ impl<M: ElementMaterial> Trial<'_, M> {
         most.1
     }
 
+    /// How far a force (N) by itself moves a node in this step, m.
+    pub(super) fn way_of(&self, step: &Step, method: &impl StepMethod<M>, node: usize, newton: f64) -> f64 {
+        let seconds = f64::from(step.seconds());
+        let mass = self.scene.inertia.get(node).map_or(0.0, |inertia| method.inertia_of(node, inertia).mass);
+        newton * seconds * seconds / (f64::from(1.0 + method.added_inertia()) * f64::from(mass))
+    }
+
     /// The force that by itself would move its node farthest in this step, measured by the node's tissue, if that is a
     /// cause.
-    fn excessive_force(&self, step: &Step, added: f32) -> Option<(u32, Cause)> {
+    fn excessive_force(&self, step: &Step, method: &impl StepMethod<M>) -> Option<(u32, Cause)> {
         let mut most = (1.0, None);
-        let seconds = f64::from(step.seconds());
         for (index, load) in self.loads.forces().iter().enumerate() {
             let node = load.node as usize;
-            let mass = f64::from((1.0 + added) * self.scene.node_mass(node));
             let newton = f64::from(ramp_factor(self.progress.time, load.ramp)) * length(load.newton);
             let size = self.scene.node_size(node);
-            let share = newton * seconds * seconds / (mass * f64::from(size));
+            let share = self.way_of(step, method, node, newton) / f64::from(size);
             if share > most.0 {
                 most = (share, Some((load.node, Cause::Force { index, newton: newton as f32, size })));
             }

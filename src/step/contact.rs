@@ -145,7 +145,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             *sum += added;
         }
         let nexts = [&before, &*force].map(|force| method.next_increment(node, inertia, increment, force));
-        totals.change(step, inertia, increment, [&before, &*force], [&nexts[0], &nexts[1]]);
+        totals.change(step, &method.inertia_of(node, inertia), increment, [&before, &*force], [&nexts[0], &nexts[1]]);
         Some(nexts[1])
     }
 
@@ -491,6 +491,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let increment = *self.increment.get(node)?;
         let next = method.next_increment(node, &inertia, &increment, self.force.get(node)?);
         let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next))?;
+        let inertia = method.inertia_of(node, &inertia);
         Some(Met { node, inertia, increment, next, meeting, way: Vec3::ZERO })
     }
 }

@@ -113,6 +113,11 @@ impl Totals {
         self.work += f64::from(joule);
     }
 
+    /// Adds work of loads, J.
+    pub(crate) fn add_work_of_loads(&mut self, joule: f64) {
+        self.work += joule;
+    }
+
     /// Replaces the sums over the nodes; the work stays.
     pub(crate) fn replace_sums(&mut self, sums: &Self) {
         *self = Self { work: self.work, ..*sums };
@@ -137,6 +142,13 @@ impl Totals {
                 self.prescribed += sign * f64::from(sums.prescribed);
             }
         }
+    }
+
+    /// Of nodes whose inertia in the step is not that of their masses: sums of inertia times the squares of their mean
+    /// increments (kg m^2), of masses times these (kg m), of force times the increments of held axes (N m), and the
+    /// largest components of the last and of the next increments, m.
+    pub(crate) fn of_sums(kinetic: f64, momentum: [f32; 3], prescribed: f32, farthest: [f32; 2]) -> Self {
+        Self { kinetic, momentum: momentum.map(f64::from), prescribed: prescribed.into(), work: 0.0, farthest }
     }
 
     /// Adds vectorised sums of nodes, one for each axis.

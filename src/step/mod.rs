@@ -10,6 +10,7 @@ mod energy_sums;
 mod heat;
 mod length;
 mod parts;
+mod pressure;
 mod pulls;
 mod status;
 pub(crate) mod threads;
@@ -92,6 +93,17 @@ pub(crate) trait StepMethod<M> {
 
     /// The steps in which the strain energy of all elements is computed once: of a long step it may take more time.
     const ENERGY_CYCLE: usize = 256;
+
+    /// Whether forces need the remainders of the displacements, for methods whose steps rounding does not heat ([`heat`]).
+    fn needs_remainders(&self) -> Option<bool> {
+        None
+    }
+
+    /// The inertia with which pushes of instruments move a node, for methods whose next increment of a node follows
+    /// from its force and one mass.
+    fn inertia_of(&self, _node: usize, inertia: &NodeInertia) -> NodeInertia {
+        *inertia
+    }
 
     /// Inertia that the method has added, as a multiple of the mass.
     fn added_inertia(&self) -> f32 {
@@ -189,8 +201,9 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             0 => heat::of_rounding(step, self.scene.inertia, self.displacement),
             _ => before.heat,
         };
-        self.is_heated = EnergyBalance { heat, ..before }.is_heated();
-        let Computed { totals, extremes } = method.compute(&mut self);
+        self.is_heated = method.needs_remainders().unwrap_or_else(|| EnergyBalance { heat, ..before }.is_heated());
+        let Computed { mut totals, extremes } = method.compute(&mut self);
+        self.enter_pressure(step, method, &mut totals);
         let balance = match self.refused {
             Some(refused) => Err(refused),
             None => self.balance(step, method, &totals).map_err(|cause| self.blamed(step, method, cause)),

@@ -140,6 +140,9 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let nodes = all.nodes(partitions);
         let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
         external_forces(force, nodes.start, inertia, self.loads, self.progress.time);
+        if let Some(pressure) = self.loads.pressure() {
+            pressure.add_forces(self.progress.time, self.displacement, nodes.start, force);
+        }
         *extremes = internal_forces(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {

@@ -1,8 +1,8 @@
-//! Pulls in an exact step ([`crate::pulls`]).
+//! Pulls in an exact step, and in one to rest ([`crate::pulls`]).
 
 use glam::{Vec3, Vec4};
 
-use super::{Step, Trial};
+use super::{Step, StepMethod, Trial};
 use crate::element::ElementMaterial;
 use crate::pulls::{Pull, Pulls};
 use crate::simd::NodeVector;
@@ -28,7 +28,7 @@ struct Point {
 impl<M: ElementMaterial> Trial<'_, M> {
     /// Adds the forces of pulls at the end of an exact step to the total forces. Gives their work, J.
     #[inline(never)]
-    pub(crate) fn pull(&mut self, step: &Step) -> f32 {
+    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>) -> f32 {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let end = self.progress.time + f64::from(step.seconds());
         self.pulls.fill(NodeVector::ZERO);
@@ -37,7 +37,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
             for (index, pull) in pulls.acting() {
                 let now = at(self.pulls, index);
-                let point = self.pulled_point(pulls, pull, step);
+                let point = self.pulled_point(pulls, pull, (step, method));
                 let gap = (pull.target(end) - Vec3::from_array(pull.at)) - (point.here + point.next);
                 let change = pull.force(gap, now, point.compliance) - now;
                 let volume = pulls
@@ -59,6 +59,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
+    /// Whether the state has room for the forces of pulls.
+    pub(crate) fn has_room_for_pulls(&self) -> bool {
+        self.loads.pulls().is_none_or(|pulls| pulls.pulls().len() <= self.pulls.len())
+    }
+
     fn add_pull(&mut self, pulls: &Pulls<'_>, pull: &Pull, (index, force): (usize, Vec3), change: Vec3) {
         if let Some(place) = self.pulls.get_mut(index) {
             place.0 = force.extend(0.0).to_array();
@@ -76,7 +81,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         pulls.mean(pull, |node| at(self.displacement, node) + at(self.remainder, node))
     }
 
-    fn pulled_point(&self, pulls: &Pulls<'_>, pull: &Pull, step: &Step) -> Point {
+    fn pulled_point(&self, pulls: &Pulls<'_>, pull: &Pull, (step, method): (&Step, &impl StepMethod<M>)) -> Point {
         let [mut here, mut next, mut last, mut compliance] = [Vec4::ZERO; 4];
         let (keep, push) = (step.keep() * step.carry(), step.push());
         for pulled in pulls.nodes_of(pull) {
@@ -84,7 +89,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let vectors = (self.displacement.get(node), self.remainder.get(node), self.increment.get(node));
             let (Some(displacement), Some(remainder), Some(increment)) = vectors else { continue };
             let (Some(inertia), Some(force)) = (self.scene.inertia.get(node), self.force.get(node)) else { continue };
-            let [x, y, z] = inertia.inverse;
+            let [x, y, z] = method.inertia_of(node, inertia).inverse;
             let (inverse, increment) = (Vec4::new(x, y, z, 0.0), Vec4::from(increment.0));
             let moved = keep * increment + push * (inverse * Vec4::from(force.0));
             here += weight * (Vec4::from(displacement.0) + Vec4::from(remainder.0));

@@ -188,7 +188,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                 found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
                 found.instrument = index as u32;
-                found.scale = self.mass_at(&found);
+                found.scale = self.mass_at(&found, method);
             } else if found.before == [0.0; 3] {
                 continue;
             }
@@ -229,11 +229,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// The mass (kg) that a push on a point of a triangle moves, as far as supports let it.
-    fn mass_at(&self, found: &TouchedPoint) -> f32 {
+    fn mass_at(&self, found: &TouchedPoint, method: &impl StepMethod<M>) -> f32 {
         let inverse = |(node, share): (usize, f32)| {
             let inertia = self.scene.inertia.get(node)?;
             let moves = inertia.inverse.iter().any(|&inverse| inverse > 0.0);
-            moves.then_some(share * share / inertia.mass)
+            moves.then_some(share * share / method.inertia_of(node, inertia).mass)
         };
         let inverse: f32 = found.corners().filter_map(inverse).sum();
         if inverse > 0.0 { 1.0 / inverse } else { 0.0 }

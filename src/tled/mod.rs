@@ -9,9 +9,12 @@
 
 mod central_differences;
 mod critical;
+mod displace;
 mod pace;
 #[cfg(feature = "std")]
 mod pressures;
+mod relaxation;
+mod settle;
 #[cfg(feature = "std")]
 mod spectrum;
 #[cfg(feature = "std")]
@@ -19,9 +22,11 @@ mod tangent;
 
 pub use critical::critical_step;
 pub(crate) use critical::each_rate;
+pub use displace::{DisplacementError, displace};
 pub use pace::{Approach, Pace, vectors_for_pace};
 #[cfg(feature = "std")]
 pub use pressures::nodal_pressures;
+pub use settle::{SettleError, Settled, settle, settle_in_parts, vectors_to_settle};
 #[cfg(feature = "std")]
 pub use spectrum::exact_critical_step;
 #[cfg(feature = "std")]
@@ -96,7 +101,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
         if is_pulled {
-            let work = trial.pull(step);
+            let work = trial.pull(step, self);
             let all = 0..trial.scene.node_count();
             totals = total(all, trial.increment, trial.force);
             totals.add_work(work);
@@ -114,7 +119,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     }
 
     fn follows_pulls(&self, trial: &Trial<'_, M>) -> bool {
-        trial.loads.pulls().is_none_or(|pulls| pulls.pulls().len() <= trial.pulls.len())
+        trial.has_room_for_pulls()
     }
 
     fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {

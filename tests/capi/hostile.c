@@ -81,7 +81,7 @@ static struct {
     uint64_t before;
     int written;
 } slots[SLOTS];
-static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, copies[4];
+static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, copies[4];
 static size_t weights_bytes, damper_bytes;
 static const char *doing;
 static supple_report report;
@@ -769,6 +769,27 @@ static supple_status feel(void) {
     return status;
 }
 
+/* To rest, or from displacements that are drawn. */
+static supple_status settle(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    if (one_in(4)) {
+        float *moved = end_of(&of_out, 12 * NODES);
+        const float far = one_in(5) ? powf(10.0f, (float)below(20) - 6.0f) : 1e-4f;
+        for (int n = 0; n < 3 * NODES; n++) {
+            moved[n] = one_in(900) ? wild(far) : far * share();
+        }
+        return supple_set_displacements(scene, object(STATE, 1), one_in(60) ? NULL : moved, number(NODES), wanted());
+    }
+    contacts_may_change();
+    const size_t needed = (supple_settle_size(NODES) + 63) / 64 * 64;
+    unsigned char *at = end_of(&of_rest, needed);
+    supple_settled told;
+    const supple_status status = supple_settle(scene, object(LOADS, 1), object(STATE, 1), one_in(5) ? wild(1e-4f) : 1e-5f, below(60), NULL,
+                                               one_in(60) ? NULL : at, one_in(20) ? 64 * below((uint32_t)(needed / 64)) : needed, &told);
+    CHECK(told.error.status == (status < 0 ? status : SUPPLE_OK) && !(told.remaining < 0.0f) && (told.steps > 0 || status != SUPPLE_OK));
+    return status;
+}
+
 static supple_status other(void) {
     supple_learned_facts facts;
     supple_scene_facts of_scene;
@@ -805,9 +826,10 @@ static void one_call(void) {
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
                {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
                {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20},
-               {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}, {"surfaces", surfaces, 6}};
+               {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}, {"surfaces", surfaces, 6},
+               {"settling", settle, 8}};
     int at = 0;
-    for (int draw = (int)below(219); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(227); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -836,7 +858,7 @@ static void one_call(void) {
         const int slot = STATE * EACH + n;
         const uint64_t now = state_hash((supple_state *)(void *)slots[slot].at, &finite);
         /* Steps are taken one after the other, and a report may not have been asked for: those may have moved it. */
-        const int may_move = all[at].call == step || all[at].call == advance || all[at].call == make_state || status >= 0;
+        const int may_move = all[at].call == step || all[at].call == advance || all[at].call == settle || all[at].call == make_state || status >= 0;
         if (!(may_move && slots[slot].written) && now != states[n]) {
             fail("a state has moved", status);
         }
@@ -869,6 +891,7 @@ int main(int argc, char **argv) {
     of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
     of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 13);
+    of_rest = arena_of(supple_settle_size(NODES) + 64);
     copies[0] = arena_of(sizes_of[STATE]), copies[1] = arena_of(sizes_of[LARGE]);
     file("weights/compact-10.weights", of_weights.start, of_weights.room, &weights_bytes);
     memmove(end_of(&of_weights, (weights_bytes + 63) / 64 * 64), of_weights.start, weights_bytes);

@@ -750,6 +750,103 @@ static void surfaces(void) {
     printf("surfaces: %u triangles, a traction of %.4f N\n", (unsigned)count, sum);
 }
 
+/* Pressures that follow the boundary; to rest under one, and from displacements of the host's. */
+static void pressures_and_rest(void) {
+    enum { MOST = 4 * TETS };
+    static _Alignas(SUPPLE_ALIGN) unsigned char memory[SUPPLE_PRESSURE_SIZE(MOST, 2)], room[SUPPLE_SETTLE_SIZE(NODES) + SUPPLE_ALIGN];
+    static uint32_t faces[MOST][3], surface_of[MOST];
+    static float moved[NODES][3];
+    const size_t enough = sizeof room - SUPPLE_ALIGN;
+    uint32_t count = 0;
+    supple_pressure *none = NULL, *pressure = NULL;
+    supple_settled settled;
+    double volume = 0.0, before = 0.0;
+    DONE(supple_boundary(tets[0], TETS, faces[0], MOST, &count));
+    const size_t bytes = supple_pressure_size(count, 2);
+#define PRESSED(given, size, corners, of, surfaces) \
+    supple_pressure_init(given, size, scene, points[0], corners, of, count, surfaces, &none, &error)
+    REFUSED(SUPPLE_E_NULL, PRESSED(NULL, bytes, faces[0], NULL, 1));
+    REFUSED(SUPPLE_E_NULL, PRESSED(memory, bytes, NULL, NULL, 1));
+    REFUSED(SUPPLE_E_SHORT, PRESSED(memory, bytes - 1, faces[0], surface_of, 2));
+    surface_of[3] = 2;
+    REFUSED(SUPPLE_E_CAPACITY, PRESSED(memory, bytes, faces[0], surface_of, 2));
+    CHECK(error.index == 3 && error.value == 2.0 && error.limit == 2.0);
+    surface_of[3] = 0;
+    const uint32_t last = faces[1][2];
+    faces[1][2] = NODES;
+    REFUSED(SUPPLE_E_INDEX, PRESSED(memory, bytes, faces[0], NULL, 1));
+    CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
+    faces[1][2] = last;
+    DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[0], surface_of, count, 2, &pressure, &error));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_set(pressure, 0, NAN, 0.0f));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_set(pressure, 0, 1.0f, -1.0f));
+    REFUSED(SUPPLE_E_CAPACITY, supple_pressure_set(pressure, 2, 1.0f, 0.0f));
+    REFUSED(SUPPLE_E_KIND, supple_set_pressure(loads, (supple_pressure *)(void *)state));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_pressure(small_loads, pressure));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_fill(pressure, 0, 0.0f, 1.0f));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_fill(pressure, 0, 1e-3f, -1.0f));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_fill(pressure, 0, NAN, 1.0f));
+    REFUSED(SUPPLE_E_CAPACITY, supple_pressure_fill(pressure, 2, 1e-3f, 1.0f));
+    REFUSED(SUPPLE_E_MISMATCH, supple_pressure_now(pressure, small_state, 0, &volume, NULL));
+
+    DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
+    DONE(supple_set_forces(loads, NULL, 0, NULL));
+    DONE(supple_set_gravity(loads, (const float[3]){0.0f, 0.0f, 0.0f}));
+    DONE(supple_state_reset(state));
+    DONE(supple_pressure_now(pressure, state, 0, &before, NULL));
+    CHECK(fabs(before / (1e-6 * X * Y * Z) - 1.0) < 1e-4);
+    DONE(supple_pressure_now(pressure, state, 1, &volume, NULL));
+    CHECK(volume == 0.0);
+    DONE(supple_set_pressure(loads, pressure));
+    DONE(supple_pressure_set(pressure, 0, 2000.0f, 0.0f));
+    const float wrong[3] = {0.0f, -1e-5f, NAN};
+    for (int n = 0; n < 3; n++) {
+        REFUSED(SUPPLE_E_NEGATIVE, supple_settle(scene, loads, state, wrong[n], 100, NULL, room, enough, &settled));
+        CHECK(settled.error.status == SUPPLE_E_NEGATIVE && settled.steps == 0 && isinf(settled.remaining));
+    }
+    REFUSED(SUPPLE_E_NULL, supple_settle(scene, loads, state, 1e-5f, 100, NULL, NULL, enough, NULL));
+    REFUSED(SUPPLE_E_SHORT, supple_settle(scene, loads, state, 1e-5f, 100, NULL, room, enough - 1, &settled));
+    CHECK(settled.error.limit == (double)enough);
+    REFUSED(SUPPLE_E_MISALIGNED, supple_settle(scene, loads, state, 1e-5f, 100, NULL, room + 16, enough, NULL));
+    REFUSED(SUPPLE_E_NOT_INITIALISED, supple_sim_settle((supple_sim *)(void *)room, 1e-5f, 100, NULL, room, enough, NULL));
+    CHECK(supple_settle(scene, loads, state, 1e-5f, 3, NULL, room, enough, &settled) == SUPPLE_BEHIND && settled.steps == 3);
+    DONE(supple_settle(scene, loads, state, 1e-5f, 5000, NULL, room, enough, &settled));
+    CHECK(settled.remaining < 1e-5f && settled.error.status == SUPPLE_OK);
+    float now = 0.0f;
+    DONE(supple_pressure_now(pressure, state, 0, &volume, &now));
+    CHECK(now == 2000.0f);
+    /* Held at both ends: less than a free body, whose bulk modulus is 120 kPa. */
+    CHECK(volume < before * (1.0 - 0.004) && volume > before * (1.0 - 0.02));
+    printf("pressure: %.2f %% of the volume in %u steps\n", 100.0 * volume / before, (unsigned)settled.steps);
+
+    /* Back to the volume that it had, by a pressure from within that is not much less than the one from outside. */
+    DONE(supple_pressure_fill(pressure, 0, (float)before, 200000.0f));
+    DONE(supple_settle(scene, loads, state, 1e-5f, 5000, NULL, room, enough, &settled));
+    double filled = 0.0;
+    DONE(supple_pressure_now(pressure, state, 0, &filled, &now));
+    CHECK(filled > volume && filled < before && now < 1000.0f && now > 0.0f);
+    CHECK(fabs(2000.0 - 200000.0 * (1.0 - filled / before) - (double)now) < 1.0);
+    DONE(supple_pressure_fill(pressure, 0, 0.0f, 0.0f));
+
+    DONE(supple_copy_displacements(state, moved[0], 3 * NODES));
+    moved[NODES / 2][1] = INFINITY;
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_set_displacements(scene, state, moved[0], NODES, &error));
+    CHECK(error.node == NODES / 2);
+    moved[NODES / 2][1] = 1e-3f;
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_displacements(scene, state, moved[0], NODES - 1, &error));
+    REFUSED(SUPPLE_E_NULL, supple_set_displacements(scene, state, NULL, NODES, &error));
+    DONE(supple_set_displacements(scene, state, moved[0], NODES, &error));
+    DONE(supple_state_reset(state));
+
+    DONE(supple_pressure_set(pressure, 0, 1e20f, 0.0f));
+    supple_report told;
+    const supple_status burst = supple_step(scene, loads, state, 1, NULL, &told);
+    note(burst);
+    CHECK(burst == SUPPLE_E_DIVERGED_PRESSURE && told.error.index == 0 && told.error.value == (double)1e20f && told.error.limit > 0.0);
+    DONE(supple_set_pressure(loads, NULL));
+    DONE(supple_state_reset(state));
+}
+
 /* Instruments that touch, hold and let go; and all that is refused of them. */
 static void contacts(void) {
     static _Alignas(SUPPLE_ALIGN) unsigned char memory[1 << 19], acts_memory[SUPPLE_LOADS_SIZE(1, 1)];
@@ -1096,6 +1193,7 @@ int main(int argc, char **argv) {
     reactions();
     surfaces();
     images();
+    pressures_and_rest();
     contacts();
     pulls();
     remarks(config);

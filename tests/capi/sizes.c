@@ -12,6 +12,8 @@ int main(void) {
     unsigned long checked = 0;
     for (uint32_t nodes = 1; nodes < 3000000; nodes += nodes / 7 + 1) {
         for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_STRAIN; element++) {
+            CHECK(supple_settle_size(nodes) == SUPPLE_SETTLE_SIZE(nodes));
+            CHECK(supple_pressure_size(nodes, element) == SUPPLE_PRESSURE_SIZE(nodes, element));
             CHECK(supple_state_size(nodes, element) == SUPPLE_STATE_SIZE(nodes, element));
         }
         for (uint32_t fallback = 0; fallback < 2; fallback++) {

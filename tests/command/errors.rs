@@ -51,6 +51,17 @@ fn bad_scenes_are_refused_in_words() {
         (with("[[force]]\nnodes = [50]\nnewton = [0.0, 1.0, 0.0]\nramp = -1.0\n"), "line 16: ramp is -1 s"),
         (with("[[move]]\nnodes = [50]\nmetre = [0.0, nan, 0.0]\n"), "line 15: metre holds NaN"),
         (with("[[traction]]\nnodes = [50, 51]\npascal = [0.0, 0.0, 1.0]\n"), "no boundary triangle"),
+        (
+            with("[[pressure]]\nnodes = [50, 51]\npascal = 1.0\n"),
+            "this pressure selects nodes, but no boundary triangle",
+        ),
+        (with("[[pressure]]\nplane = { axis = \"z\", at = 0.05 }\npascal = nan\n"), "line 15: pascal is NaN"),
+        (
+            with("[[pressure]]\nplane = { axis = \"z\", at = 0.05 }\npascal = [0.0, 0.0, 1.0]\n"),
+            "line 15: invalid type",
+        ),
+        (instead("end = 0.001", "end = 0.001\nsettle = 0.0"), "settle is 0 m, it must be a positive number"),
+        (instead("end = 0.001", "end = 0.001\nsettle = inf"), "settle is inf m"),
         (with("[[region]]\ntags = [3]\nc = 1.0\n"), "this region selects no element"),
         (with("[[region]]\nc = 1.0\n"), "line 13: give exactly one of tags, plane and box"),
         (

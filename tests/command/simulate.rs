@@ -103,6 +103,44 @@ fn a_scene_with_every_key_equals_the_kernel_called_directly() {
 }
 
 #[test]
+fn a_body_settles_under_gravity_and_a_pressure_before_time_begins() {
+    let desk = Desk::new();
+    let scene = |time: &str| {
+        format!(
+            "gravity = [0.5, 0.0, 0.0]\n{}",
+            bar(&format!(
+                "[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[[pressure]]\nplane = {{ axis = \"y\", at = 0.02 }}\npascal = 20.0\n\
+                 [time]\n{time}"
+            ))
+        )
+    };
+    let said = desk.simulate(&scene("settle = 1e-5\nend = 0.05\nframes = 2\n"), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.out.contains("at rest after"), "{}", said.out);
+    let settled = desk.last();
+    let summary = desk.summary();
+    println!("{}", summary["settled"]);
+    assert!(summary["settled"]["at_rest"] == true && summary["settled"]["remaining_m"].as_f64().unwrap() < 1e-5);
+    let first = supple::io::read_mesh(&desk.path("out/frame_0000.vtu")).unwrap();
+    assert_eq!(first.points.len(), 54);
+    // With damping the same motion ends there.
+    let said = desk.simulate(&scene("end = 3.0\n"), &["--force"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let mut apart = 0.0f64;
+    for (a, b) in settled.iter().zip(desk.last()) {
+        apart = (4..7).map(|axis| (a[axis] - b[axis]).abs()).fold(apart, f64::max);
+    }
+    let moved = settled.iter().map(|row| row[4].abs().max(row[5].abs())).fold(0.0, f64::max);
+    println!("{apart:.1e} m apart, moved by {moved:.1e} m");
+    assert!(apart < 2e-5 && moved > 1e-4);
+    // A free body never rests.
+    let free = scene("settle = 1e-5\nend = 0.001\n").replace("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n", "");
+    let said = desk.simulate(&free, &["--force"]);
+    println!("{}{}", said.out, said.err);
+    assert_eq!(desk.summary()["settled"]["at_rest"], false);
+}
+
+#[test]
 fn results_are_complete_and_where_they_should_be() {
     let desk = Desk::new();
     let said = desk.simulate(EVERYTHING, &[]);

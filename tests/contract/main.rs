@@ -12,4 +12,5 @@ mod errors;
 mod no_allocation;
 mod parts;
 mod patches;
+mod settle;
 mod simulation;

@@ -15,6 +15,7 @@ use supple::material::{AnyLaw, Element, Exponential, NeoHookean, NodalStrain, Ti
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::points::{FollowedPoint, follow, locate, words_for};
+use supple::pressure::{PressedTriangle, Pressure, SurfacePressure};
 use supple::pulls::{Pull, PulledNode, Pulls, patch};
 use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for, tiles_for};
 use supple::state::{FixedState, NodeVector};
@@ -154,7 +155,23 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     }
     state.reset();
 
+    // To rest under a pressure, with instruments, and from displacements of the host's.
+    let mut pressed_triangles = [PressedTriangle::default(); 2];
+    for (place, (index, nodes)) in pressed_triangles.iter_mut().zip(triangles.into_iter().enumerate()) {
+        *place = PressedTriangle::new(&points, index, nodes, 0).unwrap();
+    }
+    let surfaces = [SurfacePressure::new(10.0, 0.0)];
+    let pressure = Pressure::new(scene, &pressed_triangles, &surfaces).unwrap();
+    let mut room = [NodeVector::ZERO; tled::vectors_to_settle(NODES)];
+    let mut loads = Loads::new(scene, [0.0, 0.0, -1.0], &[], &[]).unwrap().pressed_by(pressure).touched_by(contact);
+    let settled = tled::settle(scene, &mut loads, state, 1e-5, 5000, &mut room).unwrap();
+    let moved = [[1e-5; 3]; NODES];
+    tled::displace(scene, state, &moved).unwrap();
+    state.reset();
+
     // Refusals as well.
+    assert!(tled::settle(scene, &mut loads, state, f32::NAN, 5000, &mut room).is_err());
+    assert!(tled::displace(scene, state, &moved[1..]).is_err());
     assert!(Step::new(1.0, 0.0, critical).is_err());
     let huge = [NodalForce { newton: [f32::MAX; 3], ..forces[0] }];
     let loads = Loads::new(scene, [0.0; 3], &huge, &[]).unwrap();
@@ -163,6 +180,8 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 
     assert_eq!(allocations(), before);
     assert!(pressed > 50 && pulled == 100, "{pressed}, {pulled}");
+    println!("{settled:?}");
+    assert!(settled.status.is_taken() && settled.steps > 10);
     println!("200 steps, strain energy {energy:.3e} J, no allocation");
     assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
 }

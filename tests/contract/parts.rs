@@ -21,9 +21,9 @@ use crate::{reference, support};
 const DT: f32 = 2e-5;
 
 /// Each part on a thread of its own, the last one first; counts them.
-struct Backwards {
-    parts: usize,
-    most: AtomicUsize,
+pub(crate) struct Backwards {
+    pub(crate) parts: usize,
+    pub(crate) most: AtomicUsize,
 }
 
 impl Threads for Backwards {

@@ -437,6 +437,40 @@ void followed(const grid &cube, supple::scene scene, supple::loads loads, supple
     EXPECT(is_done(moved.reset()));
 }
 
+// A cube under a pressure on all sides, at rest; and from displacements.
+void pressed_at_rest() {
+    const grid mesh(3);
+    const supple::body body = mesh.body();
+    const supple::settings how(supple::steps::exact);
+    std::vector<supple::line> memory(supple::lines(supple::simulation::size(body, how).value));
+    const auto made = supple::simulation::make(memory, body, how);
+    EXPECT(made);
+    const supple::simulation sim = made.value;
+    std::vector<std::uint32_t> room(body.tetrahedra.size() / 4 * 12);
+    const auto found = supple::boundary(body.tetrahedra, room);
+    const supple::span<const std::uint32_t> faces(room.data(), 3 * found.value);
+    std::vector<supple::line> own(supple::lines(supple::pressure::size(static_cast<std::uint32_t>(found.value))));
+    const auto pressed = supple::pressure::make(own, sim.scene(), body.points, faces);
+    EXPECT(found && pressed && is_done(sim.loads().set_pressure(pressed.value)));
+    const supple::pressure pressure = pressed.value;
+    const auto before = pressure.volume(sim.state());
+    EXPECT(is_done(pressure.set(200.0f)) && before && before.value > 0);
+    std::vector<supple::line> scratch(supple::lines(supple_settle_size(sim.scene().describe().value.nodes)));
+    supple::settled settled;
+    EXPECT(is_done(sim.settle(1e-6f, 10000, scratch, &settled)) && settled.remaining < 1e-6f && settled.steps > 0);
+    const auto after = pressure.volume(sim.state());
+    EXPECT(after.value < before.value && pressure.now(sim.state()).value == 200.0f);
+    EXPECT(is_done(pressure.fill(static_cast<float>(before.value), 1e5f)) && is_done(sim.settle(1e-6f, 10000, scratch)));
+    EXPECT(pressure.volume(sim.state()).value > after.value && pressure.fill(-1.0f, 1.0f) == status::e_negative);
+    EXPECT(sim.settle(0.0f, 1, scratch) == status::e_negative);
+    EXPECT(pressure.set(1.0f, 0.0f, 7) == status::e_capacity);
+    std::vector<float> moved(body.points.size(), 1e-5f);
+    EXPECT(is_done(sim.state().set_displacements(sim.scene(), moved)));
+    moved.pop_back();
+    EXPECT(sim.state().set_displacements(sim.scene(), {moved.data(), 3}) == status::e_mismatch);
+    EXPECT(is_done(sim.loads().set_pressure({})));
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -444,6 +478,7 @@ int main(int count, char **words) {
     EXPECT(supple::is_of_this_abi() && supple::version()[0] != '\0');
     EXPECT(is_done(supple::set_level(supple::current_level())));
     EXPECT(std::strcmp(supple::text(status::ok), "done") == 0);
+    pressed_at_rest();
     char tiny[5];
     EXPECT(std::strcmp(supple::describe({SUPPLE_E_NULL, supple::none, 0, 0, 0, 0}, tiny), "a po") == 0);
 

@@ -12,6 +12,7 @@ mod alarms;
 mod crushed;
 mod divergence;
 mod elements;
+mod follower_pressure;
 mod loads;
 mod measured_energy;
 mod nodal_elements;

@@ -24,6 +24,7 @@ ADVANCED = {
     **dict.fromkeys(["supple_learned_size", "supple_learned_init", "supple_learned_reset", "supple_learned_lead"], BY_THE_SIMULATION),
     **dict.fromkeys(["supple_large_size", "supple_large_init", "supple_adaptive_size", "supple_adaptive_init"], BY_THE_SIMULATION),
     **dict.fromkeys(["supple_set_step", "supple_step", "supple_learned_step", "supple_large_step", "supple_adaptive_advance"], OWN_STEPS),
+    "supple_settle": "supple_sim_settle calls it",
 }
 
 

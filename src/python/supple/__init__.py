@@ -22,12 +22,12 @@ from .points import FollowedPoints
 from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
-from .simulation import METHODS, Report, Simulation
+from .simulation import METHODS, Pressure, Report, Settled, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "Field", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls",
-    "Reaction", "ReactionForce", "Report", "Scene", "Simulation", "Touch", "UnstableStep", "displacement_field", "level", "read_image",
-    "version", "write_image",
+    "METHODS", "Diverged", "Error", "Field", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pressure",
+    "Pulls", "Reaction", "ReactionForce", "Report", "Scene", "Settled", "Simulation", "Touch", "UnstableStep", "displacement_field", "level",
+    "read_image", "version", "write_image",
 ]
 
 

@@ -17,7 +17,7 @@ lib: Any = ffi.dlopen(str(pathlib.Path(__file__).with_name("libsupple.so")))
 if lib.supple_abi() != lib.SUPPLE_ABI:
     raise ImportError(f"libsupple.so has interface {lib.supple_abi()}, the package is for {lib.SUPPLE_ABI}")
 # Statuses of steps that were refused.
-_DIVERGED = range(lib.SUPPLE_E_NO_PULLS, lib.SUPPLE_E_DIVERGED + 1)
+_DIVERGED = range(lib.SUPPLE_E_DIVERGED_PRESSURE, lib.SUPPLE_E_DIVERGED + 1)
 
 
 def words(status: int) -> str:

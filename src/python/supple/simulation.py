@@ -123,6 +123,21 @@ class Report:
         return self.status == "ok"
 
 
+@dataclasses.dataclass(frozen=True)
+class Settled:
+    """What a call of `settle` came to.
+
+    `at_rest`: whether every node is within the tolerance of where it rests; `remaining`: the estimate of the largest distance from there (m),
+    infinite before the body has swung once; `steps` that were computed; `status`: "ok", "limited" as of `advance`, or "behind" where the body
+    is not at rest after the steps, or never can be.
+    """
+
+    at_rest: bool
+    remaining: float
+    steps: int
+    status: str
+
+
 class Simulation:
     """A scene that starts at rest.
 
@@ -200,6 +215,7 @@ class Simulation:
         self._pull_memory: PullMemory | None = None
         self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
+        self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self._vectors = self._view_of_displacements()
         self.gravity = gravity
@@ -254,6 +270,39 @@ class Simulation:
         error, rows = library.new_error(), np.concatenate([forces, tractions])
         library.checked(lib.supple_set_forces(self._loads, library.pointer("supple_force", rows), len(rows), error), error, "forces")
         self._forces, self._tractions = forces, tractions
+
+    @_one_at_a_time
+    def add_pressure(self, triangles: ArrayLike, pascal: float, ramp: float = 0.0) -> Pressure:
+        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as of
+        `Mesh.boundary`. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
+        `ramp` s. It is changed through what this gives."""
+        corners, points = np.asarray(triangles), self.scene.mesh.points
+        if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
+            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
+        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        made = [*self._pressures, Pressure(self, len(self._pressures), numbers)]
+        rows = np.concatenate([one._numbers for one in made])
+        surface_of = np.concatenate([np.full(len(one._numbers) // 3, one._surface, np.uint32) for one in made])
+        memory = library.Memory(lib.supple_pressure_size(len(surface_of), len(made)))
+        error, raw = library.new_error(), ffi.new("supple_pressure **")
+        status = lib.supple_pressure_init(
+            memory.pointer, memory.size, self._raw_scene, library.pointer("float", points), library.pointer("uint32_t", rows),
+            library.pointer("uint32_t", surface_of), len(surface_of), len(made), raw, error,
+        )  # fmt: skip
+        library.checked(status, error, "pressure")
+        for one, (value, time) in zip(made, [*((one._pascal, one._ramp) for one in self._pressures), (pascal, ramp)]):
+            library.checked(lib.supple_pressure_set(raw[0], one._surface, value, time), what="pressure")
+            library.checked(lib.supple_pressure_fill(raw[0], one._surface, *one._filling), what="pressure")
+        made[-1]._pascal, made[-1]._ramp = pascal, ramp
+        library.checked(lib.supple_set_pressure(self._loads, raw[0]))
+        self._pressures, self._pressure_memory, self._pressure = made, memory, raw[0]
+        return made[-1]
+
+    @_one_at_a_time
+    def clear_pressures(self) -> None:
+        """Takes all pressures away."""
+        library.checked(lib.supple_set_pressure(self._loads, ffi.NULL))
+        self._pressures = []
 
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
@@ -489,6 +538,35 @@ class Simulation:
             raise InputError(f"take {count} steps: it must be a whole number, at least 1")
         return self.advance(count * float(self._step))
 
+    @_one_at_a_time
+    def settle(self, metre: float, *, most_steps: int = 10_000) -> Settled:
+        """Brings the body to rest under its loads and instruments, as they act at the present time, which stands still: every node to within
+        about `metre` of where it rests. Velocities are zero afterwards. Each of the steps takes about as long as an exact one. Raises
+        `Diverged` where a step is refused."""
+        if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
+            raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
+        if not (np.isfinite(metre) and metre > 0.0):
+            raise InputError(f"settle to within {metre} m: it must be a positive number")
+        self._warn_once()
+        room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
+        told = ffi.new("supple_settled *")
+        status = lib.supple_sim_settle(self._sim, metre, int(most_steps), self._threads, room.pointer, room.size, told)
+        library.checked(status, told.error, "settle")
+        word = _WORDS.get(status, str(status))
+        return Settled(word != "behind", float(told.remaining), int(told.steps), word)
+
+    @_one_at_a_time
+    def set_displacements(self, metre: ArrayLike) -> None:
+        """Puts the nodes at these displacements, shape (n, 3), m from rest, at a stop: velocities are zero, time stays, and the energy balance
+        begins anew. Fixed nodes keep what is given."""
+        rows = library.vectors(metre, "displacements")
+        if len(rows) != len(self.scene.mesh.points):
+            raise InputError(f"displacements: {len(rows)} rows, there are {len(self.scene.mesh.points)} nodes")
+        error = library.new_error()
+        given = library.pointer("float", rows)
+        library.checked(lib.supple_set_displacements(self._raw_scene, self._state, given, len(rows), error), error, "displacements")
+        self._prepare_again()
+
     # What it comes to.
 
     def _view_of_displacements(self) -> NDArray[np.float32]:
@@ -586,6 +664,63 @@ class Simulation:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...)."""
         self.scene.mesh.write(path, self._vectors)
+
+
+class Pressure:
+    """A pressure on a part of the surface, of `Simulation.add_pressure`."""
+
+    def __init__(self, simulation: Simulation, surface: int, numbers: NDArray[np.uint32]) -> None:
+        self._simulation, self._surface, self._numbers = simulation, surface, numbers
+        self._pascal = self._ramp = 0.0
+        self._filling = (0.0, 0.0)
+
+    @property
+    def pascal(self) -> float:
+        """Pa, in full."""
+        return self._pascal
+
+    @pascal.setter
+    def pascal(self, value: float) -> None:
+        self.set(value)
+
+    def set(self, pascal: float, ramp: float = 0.0) -> None:
+        """Sets it, Pa; it rises evenly over `ramp` s from the start of the simulation."""
+        with self._simulation._lock:
+            self._check()
+            status = lib.supple_pressure_set(self._simulation._pressure, self._surface, pascal, ramp)
+            library.checked(status, what=f"pressure {pascal} Pa, ramp {ramp} s")
+            self._pascal, self._ramp = pascal, ramp
+
+    def fill(self, volume: float, bulk: float) -> None:
+        """Asks for the volume (m^3) within the surface, which is closed, of a body or of a cavity: in addition to `pascal` there is a pressure from
+        within, `bulk` (Pa) times the share of the volume that is missing. With a bulk of 0 the volume is not asked for."""
+        with self._simulation._lock:
+            self._check()
+            status = lib.supple_pressure_fill(self._simulation._pressure, self._surface, volume, bulk)
+            library.checked(status, what=f"fill to {volume} m^3 with {bulk} Pa")
+            self._filling = (volume, bulk)
+
+    @property
+    def volume(self) -> float:
+        """Within the surface, if it is closed, m^3."""
+        return self._now()[0]
+
+    @property
+    def now(self) -> float:
+        """The pressure at present, with what fills the surface, Pa."""
+        return self._now()[1]
+
+    def _now(self) -> tuple[float, float]:
+        with self._simulation._lock:
+            self._check()
+            volume, pascal = ffi.new("double *"), ffi.new("float *")
+            state = self._simulation._state
+            library.checked(lib.supple_pressure_now(self._simulation._pressure, state, self._surface, volume, pascal))
+            return float(volume[0]), float(pascal[0])
+
+    def _check(self) -> None:
+        if self not in self._simulation._pressures:
+            raise InputError("this pressure is no more: clear_pressures has taken it away")
 
 
 def _threads(count: int) -> Any:

@@ -38,14 +38,16 @@ impl Figures {
         let ratios = scene.element_fields(displacements).map(|fields| fields.volume_ratio);
         let length = |node: usize| displacements[node].to_array().iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
         let furthest = (0..displacements.len()).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+        // Without those to rest, which are no time.
+        let steps = state.steps().saturating_sub(outcome.settled.map_or(0, |settled| settled.steps.into()));
         let spent = outcome.spent.as_secs_f64().max(1e-9);
         Self {
             nodes: scene.node_count(),
             elements: scene.element_count(),
             mass: scene.mass(),
             time: state.time(),
-            steps: state.steps(),
-            steps_undone: outcome.computed.saturating_sub(state.steps()),
+            steps,
+            steps_undone: outcome.computed.saturating_sub(steps),
             us_per_step: spent * 1e6 / outcome.computed.max(1) as f64,
             real_time_factor: state.time() / spent,
             volume_change: volume_ratio(setup, state) - 1.0,

@@ -4,6 +4,7 @@
 use serde_json::{Map, Value, json};
 use supple::adaptive::Taken;
 use supple::inertia::Grid;
+use supple::tled::Settled;
 
 use super::figures::Figures;
 use crate::added_mass::describe_added;
@@ -68,6 +69,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     summary.add_section("learned", learned.map(|(choice, trace)| learned_section(choice, trace)));
     let large = outcome.large.as_ref();
     summary.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
+    add_settled(&mut summary, outcome);
     add_steps(&mut summary, setup, outcome, figures);
     summary.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
     add_estimate(&mut summary, outcome.guard.as_ref());
@@ -108,6 +110,17 @@ fn add_scene(summary: &mut Summary, setup: &Setup, figures: &Figures) {
     let material = setup.tissues.to_string();
     summary.add("material", material.clone(), json!({ "material": material }));
     summary.add_figures(json!({ "damping_per_s": decimal(setup.damping) }));
+}
+
+fn add_settled(summary: &mut Summary, outcome: &Outcome) {
+    let Some(settled) = outcome.settled else { return summary.add_figures(json!({ "settled": null })) };
+    let Settled { at_rest, remaining, steps, .. } = settled;
+    let word = if at_rest { "at rest" } else { "not at rest" };
+    summary.add(
+        "settled",
+        format!("{word} after {steps} steps, {:.2e} m to go", remaining),
+        json!({ "settled": { "at_rest": at_rest, "remaining_m": decimal(remaining), "steps": steps } }),
+    );
 }
 
 fn add_steps(summary: &mut Summary, setup: &Setup, outcome: &Outcome, figures: &Figures) {

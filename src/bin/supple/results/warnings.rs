@@ -11,6 +11,12 @@ const OUTSIDE: f64 = 0.01;
 /// Of the scene, then of what became of it.
 pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     let mut warnings = setup.warnings.clone();
+    if let Some(settled) = outcome.settled.filter(|settled| !settled.at_rest) {
+        warnings.push(format!(
+            "the body is not at rest after {} steps, {:.2e} m to go; a body that no support holds never is",
+            settled.steps, settled.remaining
+        ));
+    }
     if let Some(time) = outcome.above_from {
         warnings.push(format!(
             "from {time:.3} s on the step was above the stable {:.3e} s, as the tissue had stiffened; shorten it or \

@@ -23,6 +23,9 @@ use start::Start;
 /// Steps are single precision: their sum may miss a time by this share of the whole.
 const ROUNDING: f64 = 1e-7;
 
+/// Steps after which a body is left where it is on its way to rest.
+const MOST_STEPS_TO_SETTLE: u32 = 50_000;
+
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the
 /// time (s) now and then.
 pub(crate) fn run<'a>(
@@ -52,9 +55,13 @@ pub(crate) fn run<'a>(
     let loads = setup.loads(simulation.scene())?;
     let limits = setup.pulls.limit(simulation.scene().view());
     let mut running = Running { setup, simulation, loads, limits, outcome, tick, taken: 0 };
+    if let Some(metre) = time.settle {
+        running.settle(metre)?;
+    }
     running.outcome.enter_frame(running.simulation.state());
     running.read_points()?;
     frame(&mut running.simulation)?;
+    let frames = if running.outcome.divergence.is_some() { 0 } else { frames };
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
@@ -89,6 +96,20 @@ struct Running<'a> {
 }
 
 impl Running<'_> {
+    /// To rest to within so many metres, under the loads of the start.
+    fn settle(&mut self, metre: f32) -> Result<(), Problem> {
+        let rounding = self.rounding();
+        let Self { setup, simulation, loads, limits, outcome, .. } = self;
+        let (instruments, pulls) = (setup.instruments.at(rounding), setup.pulls.at(rounding, limits));
+        let mut loads = setup.acting(*loads, &instruments, &pulls)?;
+        let settled = simulation.settle_under(metre, MOST_STEPS_TO_SETTLE, &mut loads).map_err(Problem::of)?;
+        outcome.settled = Some(settled);
+        if let Status::Diverged(divergence) = settled.status {
+            outcome.divergence = Some(divergence);
+        }
+        Ok(())
+    }
+
     /// Intervals of so many seconds, until there have been as many.
     fn take_until(&mut self, target: u64, seconds: f32) -> Result<(), Problem> {
         while self.taken < target && self.outcome.divergence.is_none() {
@@ -136,15 +157,8 @@ impl Running<'_> {
     fn advance_from(&mut self, from: f64, until: f64) -> Result<(), Problem> {
         let rounding = self.rounding();
         let Self { setup, simulation, loads, limits, outcome, tick, .. } = self;
-        let (mut loads, nodes) = (*loads, simulation.scene().node_count());
-        let instruments = setup.instruments.at(from + rounding);
-        if !instruments.is_empty() {
-            loads = loads.touched_by(setup.instruments.contact(&instruments, nodes)?);
-        }
-        let pulls = setup.pulls.at(from + rounding, limits);
-        if !pulls.is_empty() {
-            loads = loads.pulled_by(setup.pulls.pulling(&pulls, nodes)?);
-        }
+        let (instruments, pulls) = (setup.instruments.at(from + rounding), setup.pulls.at(from + rounding, limits));
+        let mut loads = setup.acting(*loads, &instruments, &pulls)?;
         let mut watched = Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
         let mut watch = |event: Event<'_>| {
             if let Event::Tries(time) = event {

@@ -10,6 +10,7 @@ use supple::material::J_FLOOR;
 use supple::simulation::Report;
 use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
+use supple::tled::Settled;
 
 use super::followed::FollowedPoints;
 use super::pulled::PulledPoints;
@@ -79,6 +80,8 @@ pub(crate) struct Outcome {
     /// With points.
     pub(crate) points: FollowedPoints,
     pub(crate) frames: Vec<FrameTrace>,
+    /// Where the body was brought to rest before it moved.
+    pub(crate) settled: Option<Settled>,
 }
 
 impl Outcome {
@@ -102,6 +105,7 @@ impl Outcome {
             pulls: PulledPoints::default(),
             points: FollowedPoints::default(),
             frames: vec![],
+            settled: None,
         }
     }
 

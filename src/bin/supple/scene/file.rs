@@ -37,6 +37,8 @@ pub(crate) struct SceneTable {
     #[serde(default)]
     pub(crate) traction: Vec<Spanned<TractionTable>>,
     #[serde(default)]
+    pub(crate) pressure: Vec<Spanned<PressureTable>>,
+    #[serde(default)]
     pub(crate) instrument: Vec<Spanned<InstrumentTable>>,
     #[serde(default)]
     pub(crate) pull: Vec<Spanned<PullTable>>,
@@ -123,6 +125,7 @@ entry!(ForceTable { newton: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 entry!(MoveTable { metre: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>>, axes: Option<Spanned<String>> });
 entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 entry!(SpringTable { stiffness: Option<Spanned<f32>>, per_area: Option<Spanned<f32>> });
+entry!(PressureTable { pascal: Spanned<f32>, ramp: Option<Spanned<f32>> });
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -133,6 +136,7 @@ pub(crate) struct TimeTable {
     pub(crate) frames: Option<Spanned<u32>>,
     pub(crate) method: Option<Spanned<String>>,
     pub(crate) lattice: Option<Spanned<[u32; 3]>>,
+    pub(crate) settle: Option<Spanned<f32>>,
 }
 
 /// A network that takes over from the exact step.
@@ -191,12 +195,13 @@ impl SceneFile {
         let force = scene.force.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let motion = scene.motion.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let traction = scene.traction.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let pressure = scene.pressure.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
         let pull = scene.pull.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let point = scene.point.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let spring = scene.spring.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
-        let mut given = given.chain(instrument).chain(pull).chain(spring).chain(point);
+        let mut given = given.chain(pressure).chain(instrument).chain(pull).chain(spring).chain(point);
         let first = given.next();
         if let Some(second) = given.next() {
             return Err(self.problem(second, "gravity is given twice"));

@@ -1,15 +1,17 @@
 //! Supports, forces, motions and tractions of a scene file.
 
 use supple::loads::{Motion, NodalForce, traction};
+use supple::mesh::boundary as boundary_of;
+use supple::pressure::{SurfacePressure, VecPressure};
 use supple::scene::{Axes, Support};
 use toml::Spanned;
 
 use super::body::Body;
-use super::file::SceneFile;
+use super::file::{SceneFile, Selection};
 use super::select::select;
 use crate::problem::Problem;
 
-type Lists = (Vec<Support>, Vec<NodalForce>, Vec<Motion>);
+type Lists = (Vec<Support>, Vec<NodalForce>, Vec<Motion>, VecPressure);
 
 pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem> {
     let scene = &file.scene;
@@ -38,22 +40,46 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
     for at in &scene.traction {
         let pascal = read_vector(file, "pascal", &at.get_ref().pascal)?;
         let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
-        let mut selected = vec![false; body.local.len()];
-        for node in select(file, at, &at.get_ref().selection(), body)? {
-            selected[node as usize] = true;
-        }
-        let triangles: Vec<_> =
-            boundary.iter().filter(|triangle| triangle.iter().all(|&node| selected[node as usize])).copied().collect();
-        if triangles.is_empty() {
-            return Err(
-                file.problem(at, "this traction selects nodes, but no boundary triangle with all three of its nodes")
-            );
-        }
+        let triangles = select_triangles(file, at, "traction", &at.get_ref().selection(), (body, &boundary))?;
         for force in traction(&body.local, &triangles, pascal, ramp) {
             forces.push(force.map_err(|error| file.problem(at, error))?);
         }
     }
-    Ok((supports, forces, motions))
+    let mut pressures = VecPressure::default();
+    // Outward also where elements have been turned.
+    let boundary = if scene.pressure.is_empty() { vec![] } else { boundary_of(body.checked()?.tets()) };
+    for at in &scene.pressure {
+        let pascal = *at.get_ref().pascal.get_ref();
+        if !pascal.is_finite() {
+            return Err(file.problem(&at.get_ref().pascal, format!("pascal is {pascal}")));
+        }
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
+        let triangles = select_triangles(file, at, "pressure", &at.get_ref().selection(), (body, &boundary))?;
+        let pressure = SurfacePressure::new(pascal, ramp);
+        pressures.press(&body.local, &triangles, pressure).map_err(|error| file.problem(at, error))?;
+    }
+    Ok((supports, forces, motions, pressures))
+}
+
+/// The triangles of the boundary with all three nodes selected.
+fn select_triangles<T>(
+    file: &SceneFile,
+    at: &Spanned<T>,
+    what: &str,
+    selection: &Selection<'_>,
+    (body, boundary): (&Body, &[[u32; 3]]),
+) -> Result<Vec<[u32; 3]>, Problem> {
+    let mut selected = vec![false; body.local.len()];
+    for node in select(file, at, selection, body)? {
+        selected[node as usize] = true;
+    }
+    let is_selected = |triangle: &&[u32; 3]| triangle.iter().all(|&node| selected[node as usize]);
+    let triangles: Vec<_> = boundary.iter().filter(is_selected).copied().collect();
+    if triangles.is_empty() {
+        let text = format!("this {what} selects nodes, but no boundary triangle with all three of its nodes");
+        return Err(file.problem(at, text));
+    }
+    Ok(triangles)
 }
 
 fn read_ramp(file: &SceneFile, ramp: Option<&Spanned<f32>>) -> Result<f32, Problem> {

@@ -1,7 +1,10 @@
 //! A scene ready to be built: nodes in float32 around the body's centre, supports, loads, tissues, method.
 
+use supple::contact::Instrument;
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
+use supple::pressure::VecPressure;
+use supple::pulls::Pull;
 use supple::scene::{AsScene, BuildError, Support, VecScene};
 use supple::simulation::Simulation;
 use supple::state::VecState;
@@ -27,6 +30,7 @@ pub struct Setup {
     pub supports: Vec<Support>,
     pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
+    pub(crate) pressures: VecPressure,
     pub instruments: SceneInstruments,
     pub pulls: ScenePulls,
     pub points: ScenePoints,
@@ -59,7 +63,7 @@ impl Setup {
             Some(learned) => learned.damping(file, scene.damping.as_ref())?,
             None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
         };
-        let (supports, forces, motions) = read_loads(file, &body)?;
+        let (supports, forces, motions, pressures) = read_loads(file, &body)?;
         let instruments = SceneInstruments::read(file, &body)?;
         let pulls = ScenePulls::read(file, &body)?;
         let points = ScenePoints::read(file, &body)?;
@@ -80,6 +84,7 @@ impl Setup {
             supports,
             forces,
             motions,
+            pressures,
             instruments,
             pulls,
             points,
@@ -100,6 +105,7 @@ impl Setup {
             supports: vec![],
             forces: vec![],
             motions: vec![],
+            pressures: VecPressure::default(),
             instruments: SceneInstruments::default(),
             pulls: ScenePulls::default(),
             points: ScenePoints::default(),
@@ -157,9 +163,27 @@ impl Setup {
         }
     }
 
+    /// These loads with instruments and pulls, if there are any.
+    pub(crate) fn acting<'a>(
+        &'a self,
+        loads: Loads<'a>,
+        instruments: &'a [Instrument<'a>],
+        pulls: &'a [Pull],
+    ) -> Result<Loads<'a>, Problem> {
+        let (mut loads, nodes) = (loads, self.body.local.len());
+        if !instruments.is_empty() {
+            loads = loads.touched_by(self.instruments.contact(instruments, nodes)?);
+        }
+        if !pulls.is_empty() {
+            loads = loads.pulled_by(self.pulls.pulling(pulls, nodes)?);
+        }
+        Ok(loads)
+    }
+
     /// What acts on the scene.
     pub fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
-        Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)
+        let loads = Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)?;
+        self.pressures.on(scene, loads).map_err(Problem::of)
     }
 }
 

@@ -37,6 +37,8 @@ pub struct Timing {
     /// s.
     pub(crate) end: f64,
     pub(crate) frames: u32,
+    /// Within this distance of rest (m) the body is brought before it moves, if it is.
+    pub(crate) settle: Option<f32>,
 }
 
 impl Timing {
@@ -77,7 +79,13 @@ impl Timing {
         }
         let lattice_at = time.lattice.as_ref().map(|at| file.place(at));
         let step_at = time.step.as_ref().map_or_else(|| file.place(&file.scene.time), |at| file.place(at));
-        let timing = Self { method, old_name, step, is_adaptive, tolerance, step_at, lattice_at, end, frames };
+        let settle = time.settle.as_ref().map(|at| *at.get_ref());
+        if let (Some(metre), Some(at)) = (settle, &time.settle)
+            && !(metre.is_finite() && metre > 0.0)
+        {
+            return Err(file.problem(at, format!("settle is {metre} m, it must be a positive number")));
+        }
+        let timing = Self { method, old_name, step, is_adaptive, tolerance, step_at, lattice_at, end, frames, settle };
         if let StepChoice::Seconds(seconds) = step {
             timing.check_length(seconds)?;
         }
@@ -96,6 +104,7 @@ impl Timing {
             lattice_at: None,
             end: 1.02,
             frames: 34,
+            settle: None,
         }
     }
 

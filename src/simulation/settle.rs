@@ -1,0 +1,57 @@
+//! To rest, and from displacements of the host's, whatever the method.
+
+use std::vec;
+
+use super::{Simulation, SimulationError};
+use crate::loads::LoadsOverTime;
+use crate::simd::NodeVector;
+use crate::step::{CallingThread, Status, Threads};
+use crate::tled::{self, Settled, settle_in_parts, vectors_to_settle};
+
+impl Simulation<'_> {
+    /// Brings the body to rest under its loads and instruments ([`tled::settle`]): every node to within about `metre` (m)
+    /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
+    /// time, which stands still, and velocities are zero afterwards; steps of every method go on from there. Where a
+    /// step is refused the error says why, and the state is that before it.
+    pub fn settle(&mut self, metre: f32, most_steps: u32) -> Result<Settled, SimulationError> {
+        self.settle_in_parts(metre, most_steps, &CallingThread)
+    }
+
+    /// The same, to the bit, on several threads of the host.
+    pub fn settle_in_parts(
+        &mut self,
+        metre: f32,
+        most_steps: u32,
+        threads: &impl Threads,
+    ) -> Result<Settled, SimulationError> {
+        let (mut loads, scene, state) = self.acting()?;
+        let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
+        let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, most_steps, &mut room, threads)?;
+        match settled.status {
+            Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
+            _ => Ok(settled),
+        }
+    }
+
+    /// The same under loads of the caller's in place of its own. A step that is refused is in the result, not an error.
+    pub fn settle_under(
+        &mut self,
+        metre: f32,
+        most_steps: u32,
+        mut loads: &mut dyn LoadsOverTime,
+    ) -> Result<Settled, SimulationError> {
+        let (scene, state) = self.parts_mut();
+        let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
+        let (view, state) = (scene.view(), state.view());
+        Ok(settle_in_parts(view, &mut loads, state, metre, most_steps, &mut room, &CallingThread)?)
+    }
+
+    /// Puts the nodes at these displacements (m, from rest), one for each, at a stop: velocities are zero and time stays
+    /// ([`tled::displace`]). Steps are prepared anew from there.
+    pub fn set_displacements(&mut self, metre: &[[f32; 3]]) -> Result<(), SimulationError> {
+        let (scene, state) = self.parts_mut();
+        tled::displace(scene, state, metre)?;
+        self.forget_steps();
+        Ok(())
+    }
+}

@@ -1,0 +1,277 @@
+//! To rest (`supple::tled::settle`) and from displacements of the host's: judged by a long damped motion of exact steps.
+
+use std::sync::atomic::AtomicUsize;
+
+use supple::contact::{Instrument, Pose, Shape};
+use supple::inertia::{self, Cells};
+use supple::loads::{Motion, NodalForce};
+use supple::material::{Element, VecMaterial};
+use supple::mesh::boundary;
+use supple::pressure::SurfacePressure;
+use supple::scene::{Axes, Support};
+use supple::simulation::{Method, Settings, Simulation, SimulationError};
+use supple::state::NodeVector;
+use supple::step::{MOST_PARTS, Status};
+use supple::tled::{self, DisplacementError, SettleError};
+
+use crate::parts::Backwards;
+use crate::support::{Body, NEO, bits};
+
+const ELEMENTS: [Element; 3] = [Element::Linear, Element::NodalPressure, Element::NodalStrain];
+/// m/s^2: the bar bends by a tenth of its length.
+const GRAVITY: [f32; 3] = [0.6, 0.0, -1.0];
+const TOLERANCE: f32 = 1e-5;
+/// 1/s.
+const DAMPING: f32 = 10.0;
+
+fn body() -> Body {
+    Body::irregular([0.03, 0.03, 0.06], [3, 3, 6])
+}
+
+fn held(body: &Body) -> Vec<u32> {
+    body.nodes_where(|[_, _, z]| z == 0.0)
+}
+
+/// A bar that is fixed at one end, or free.
+fn bar(element: Element, is_held: bool) -> Simulation<'static> {
+    let body = body();
+    let fixed: Vec<_> = held(&body).into_iter().filter(|_| is_held).map(Support::fixed).collect();
+    Simulation::new(body.points, body.tets, VecMaterial::one(element, NEO, 1000.0), &fixed).unwrap()
+}
+
+/// The largest distance of a node, m.
+fn apart(a: &[NodeVector], b: &[NodeVector]) -> f32 {
+    let square = |(a, b): (&NodeVector, &NodeVector)| {
+        let (a, b) = (a.to_array(), b.to_array());
+        (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f32>()
+    };
+    a.iter().zip(b).map(square).fold(0.0, f32::max).sqrt()
+}
+
+/// Where a damped motion under the same loads ends, which is still by then.
+fn damped(simulation: &mut Simulation<'_>, seconds: f64) -> Vec<NodeVector> {
+    simulation.set(Settings { damping: DAMPING, ..Settings::default() });
+    simulation.advance(seconds).unwrap();
+    let before = simulation.displacements().to_vec();
+    simulation.advance(0.2).unwrap();
+    let moved = apart(&before, simulation.displacements());
+    assert!(moved < 0.1 * TOLERANCE, "the reference moves by {moved:.2e} m");
+    simulation.displacements().to_vec()
+}
+
+/// Settles it, and tells how.
+fn settled(what: &str, simulation: &mut Simulation<'_>, reference: &[NodeVector], most: f32) {
+    let time = simulation.state().time();
+    let settled = simulation.settle(TOLERANCE, 10_000).unwrap();
+    let error = apart(simulation.displacements(), reference);
+    println!(
+        "{what}: {} steps, {:.2e} m to go by the estimate, {error:.2e} m in truth, moved by {:.1} mm",
+        settled.steps,
+        settled.remaining,
+        1e3 * apart(reference, &[NodeVector::ZERO; 1000]),
+    );
+    assert!(settled.at_rest && settled.status == Status::Ok && settled.remaining < TOLERANCE);
+    assert!(error < most, "{what}: {error} m");
+    let state = simulation.state();
+    assert_eq!((state.time(), state.last_step(), state.velocity(20)), (time, 0.0, [0.0; 3]));
+    let balance = state.energy_balance();
+    assert!(balance.kinetic == 0.0 && balance.work == 0.0 && balance.start > 0.0);
+}
+
+#[test]
+fn it_rests_where_a_damped_motion_ends_under_gravity_and_a_force() {
+    for element in ELEMENTS {
+        let loaded = |force: [f32; 3], gravity| {
+            let mut simulation = bar(element, true);
+            let tip = body().farthest(2);
+            simulation.gravity = gravity;
+            simulation.forces = vec![NodalForce { node: tip, newton: force, ramp: 0.0 }];
+            simulation
+        };
+        for (what, force, gravity) in [("gravity", [0.0; 3], GRAVITY), ("a force", [2e-3, 1e-3, 0.0], [0.0; 3])] {
+            let reference = damped(&mut loaded(force, gravity), 4.0);
+            let mut resting = loaded(force, gravity);
+            settled(&format!("{element:?}, {what}"), &mut resting, &reference, TOLERANCE);
+            // The supports bear the load.
+            let (body, forces) = (body(), resting.state().forces());
+            let borne = held(&body).iter().fold([0.0; 3], |sum, &node| {
+                let force = forces[node as usize].to_array();
+                [0, 1, 2].map(|axis| sum[axis] + force[axis])
+            });
+            let mass = resting.scene().view().mass() as f32;
+            for axis in 0..3 {
+                let load = force[axis] + mass * gravity[axis];
+                assert!((borne[axis] - load).abs() < 0.01 * mass.max(1e-3), "{borne:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn it_rests_under_a_ball_that_presses() {
+    for (element, triangles) in ELEMENTS.into_iter().flat_map(|element| [(element, false), (element, true)]) {
+        let pressed = || {
+            let body = body();
+            let mut simulation = bar(element, true).meeting(triangles).unwrap();
+            let [x, y, z] = body.points[body.farthest(2) as usize];
+            let pose = Pose::at([x + 0.012, y + 0.012, z + 0.012 - 1e-3]);
+            simulation.instruments = vec![Instrument::resting(Shape::Sphere { radius: 0.012 }, pose)];
+            simulation
+        };
+        let mut moved = pressed();
+        let reference = damped(&mut moved, 3.0);
+        let mut resting = pressed();
+        // How deep triangles are after a bounded number of sweeps depends on the masses.
+        let most = if triangles { 4.0 * TOLERANCE } else { TOLERANCE };
+        settled(&format!("{element:?}, a ball, triangles: {triangles}"), &mut resting, &reference, most);
+        let [still, damped] = [&resting, &moved].map(|simulation| simulation.touches()[0]);
+        println!("    it feels {:.3} mN, {:.3} mN in the damped motion", 1e3 * still.force[2], 1e3 * damped.force[2]);
+        assert!((still.force[2] / damped.force[2] - 1.0).abs() < 0.03 && still.force[2] > 1e-3);
+    }
+}
+
+#[test]
+fn a_free_body_that_falls_is_not_at_rest() {
+    for element in ELEMENTS {
+        let mut simulation = bar(element, false);
+        simulation.gravity = GRAVITY;
+        let settled = simulation.settle(TOLERANCE, 300).unwrap();
+        assert!(!settled.at_rest && settled.remaining > TOLERANCE, "{settled:?}");
+        assert_eq!(settled.steps, 300);
+        // Without loads it is where it rests.
+        let mut simulation = bar(element, false);
+        assert!(simulation.settle(TOLERANCE, 1000).unwrap().at_rest);
+    }
+}
+
+#[test]
+fn supports_go_where_they_are_asked_for() {
+    let body = body();
+    let end = body.nodes_where(|[_, _, z]| z > 0.0599);
+    let mut supports: Vec<_> = held(&body).into_iter().map(Support::fixed).collect();
+    supports.extend(end.iter().map(|&node| Support::moved(node)));
+    let material = VecMaterial::one(Element::NodalStrain, NEO, 1000.0);
+    let mut simulation = Simulation::new(body.points, body.tets, material, &supports).unwrap();
+    let metre = [0.004, 0.0, 0.002];
+    simulation.motions = end.iter().map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: 0.0 }).collect();
+    assert!(simulation.settle(TOLERANCE, 5000).unwrap().at_rest);
+    for &node in &end {
+        assert_eq!(simulation.displacements()[node as usize].to_array(), metre);
+    }
+    let before = simulation.displacements().to_vec();
+    let report = simulation.advance(0.1).unwrap();
+    assert!(report.is_ok() && apart(&before, simulation.displacements()) < 2.0 * TOLERANCE);
+}
+
+#[test]
+fn steps_of_every_kind_go_on_from_rest() {
+    let methods = [
+        Method::Exact,
+        Method::Long(inertia::Method::new(Cells::Given([1, 1, 2]))),
+        Method::Auto(inertia::Method::new(Cells::Given([1, 1, 2]))),
+    ];
+    for (method, element) in methods.into_iter().flat_map(|method| ELEMENTS.map(|element| (method.clone(), element))) {
+        let mut simulation = bar(element, true).with(Settings { method, damping: DAMPING, ..Settings::default() });
+        simulation.gravity = GRAVITY;
+        simulation.advance(0.05).unwrap();
+        assert!(simulation.settle(TOLERANCE, 10_000).unwrap().at_rest);
+        let before = simulation.displacements().to_vec();
+        let reports: Vec<_> = (0..6).map(|_| simulation.advance(0.05).unwrap()).collect();
+        // A guard begins anew: after its first comparisons it finds no error.
+        let last = reports[5];
+        assert!(last.is_ok(), "{last:?}");
+        assert!(last.estimate.is_none_or(|estimate| estimate.largest < 10.0 * TOLERANCE), "{last:?}");
+        let moved = apart(&before, simulation.displacements());
+        println!("{element:?}: moved by {moved:.2e} m in 0.3 s");
+        assert!(moved < 2.0 * TOLERANCE);
+    }
+}
+
+#[test]
+fn the_work_is_bounded_and_can_be_taken_in_parts() {
+    let mut simulation = bar(Element::NodalPressure, true);
+    simulation.gravity = GRAVITY;
+    let first = simulation.settle(TOLERANCE, 40).unwrap();
+    assert_eq!((first.at_rest, first.steps, simulation.state().steps()), (false, 40, 40));
+    assert_eq!(simulation.state().velocity(30), [0.0; 3]);
+    let rest = (0..40).find(|_| simulation.settle(TOLERANCE, 250).unwrap().at_rest);
+    println!("at rest after {rest:?} more calls");
+    assert!(rest.is_some());
+    assert!(!bar(Element::Linear, true).settle(TOLERANCE, 0).unwrap().at_rest);
+}
+
+#[test]
+fn hostile_values_are_refused_in_words() {
+    let mut simulation = bar(Element::Linear, true);
+    for metre in [0.0, -1e-5, f32::NAN, f32::INFINITY] {
+        let error = simulation.settle(metre, 100).unwrap_err();
+        assert_eq!(error.to_string(), format!("settle to within {metre} m: it must be a finite positive number"));
+    }
+    let (scene, state) = simulation.parts_mut();
+    let mut loads = supple::loads::Loads::NONE;
+    let error = tled::settle(scene, &mut loads, state, TOLERANCE, 10, &mut [NodeVector::ZERO; 7]).unwrap_err();
+    let needed = tled::vectors_to_settle(scene.node_count());
+    assert_eq!(error, SettleError::Capacity { needed, capacity: 7 });
+    // A force that tears is named, and the state stays a number.
+    simulation.forces = vec![NodalForce { node: body().farthest(2), newton: [1e12, 0.0, 0.0], ramp: 0.0 }];
+    let error = simulation.settle(TOLERANCE, 100).unwrap_err();
+    println!("{error}");
+    assert!(matches!(error, SimulationError::Refused(_)) && error.to_string().contains("force 0"));
+    assert!(simulation.displacements().iter().all(|u| u.to_array().iter().all(|axis| axis.is_finite())));
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let body = Body::bar([0.1, 0.1, 0.22], [10, 10, 22]);
+    let fixed: Vec<_> = held(&body).into_iter().map(Support::fixed).collect();
+    for element in ELEMENTS {
+        let settle = |parts: usize| {
+            let material = VecMaterial::one(element, NEO, 1000.0);
+            let mut simulation = Simulation::new(body.points.clone(), body.tets.clone(), material, &fixed).unwrap();
+            simulation.gravity = GRAVITY;
+            let surface = boundary(body.tets.iter().copied());
+            let pressure = SurfacePressure::new(200.0, 0.0);
+            simulation.pressures.press(&body.points, &surface, pressure).unwrap();
+            let threads = Backwards { parts, most: AtomicUsize::new(0) };
+            let settled = simulation.settle_in_parts(TOLERANCE, 60, &threads).unwrap();
+            simulation.advance_in_parts(0.01, &threads).unwrap();
+            (bits(simulation.state()), settled.steps, settled.remaining.to_bits(), threads.most.into_inner())
+        };
+        let (one, several) = (settle(1), settle(MOST_PARTS));
+        assert!(several.3 > 1 && (&one.0, one.1, one.2) == (&several.0, several.1, several.2), "{element:?}");
+    }
+}
+
+#[test]
+fn displacements_can_be_set() {
+    for element in ELEMENTS {
+        let mut simulation = bar(element, true);
+        simulation.gravity = GRAVITY;
+        simulation.advance(0.02).unwrap();
+        let mut rest = bar(element, true);
+        rest.gravity = GRAVITY;
+        assert!(rest.settle(TOLERANCE, 10_000).unwrap().at_rest);
+        let asked: Vec<_> = rest.displacements().iter().map(|u| u.to_array()).collect();
+        let before = bits(simulation.state());
+        let mut bad = asked.clone();
+        bad[5][1] = f32::NAN;
+        let error = simulation.set_displacements(&bad).unwrap_err();
+        assert_eq!(error.to_string(), "the displacement of node 5 holds NaN");
+        let error = simulation.set_displacements(&asked[1..]).unwrap_err();
+        assert_eq!(
+            error,
+            SimulationError::Displacement(DisplacementError::Count { given: asked.len() - 1, nodes: asked.len() })
+        );
+        assert!(bits(simulation.state()) == before);
+        let time = simulation.state().time();
+        simulation.set_displacements(&asked).unwrap();
+        assert!(simulation.displacements().iter().zip(&asked).all(|(u, asked)| u.to_array() == *asked));
+        let (of_set, of_rest) = (simulation.state().energy_balance(), rest.state().energy_balance());
+        assert!((of_set.start / of_rest.start - 1.0).abs() < 1e-6 && of_set.kinetic == 0.0 && of_set.work == 0.0);
+        assert_eq!((simulation.state().time(), simulation.state().velocity(30)), (time, [0.0; 3]));
+        let report = simulation.advance(0.1).unwrap();
+        assert!(report.is_ok());
+        let moved = apart(simulation.displacements(), rest.displacements());
+        assert!(moved < 2.0 * TOLERANCE, "{element:?}: {moved} m");
+    }
+}

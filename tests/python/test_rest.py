@@ -1,0 +1,123 @@
+"""To rest, from displacements of one's own, and under pressures that follow the surface."""
+
+import numpy as np
+import pytest
+import supple
+from conftest import bar
+
+GRAVITY = (0.4, 0.0, -1.0)
+TOLERANCE = 1e-5
+
+
+def held(**settings):
+    """A bar that hangs from one end."""
+    mesh = bar(cells=(3, 3, 8))
+    material = supple.Material.from_moduli(3_000.0, 0.45, density=1000.0)
+    scene = supple.Scene(mesh, material, fixed=mesh.points[:, 2] < 1e-6, element=settings.pop("element", "nodal-strain"))
+    return supple.Simulation(scene, gravity=GRAVITY, **settings)
+
+
+@pytest.mark.parametrize("element", ["linear", "nodal-pressure", "nodal-strain"])
+def test_it_rests_where_a_damped_motion_ends(element):
+    damped = held(element=element, damping=20.0)
+    damped.advance(4.0)
+    resting = held(element=element)
+    told = resting.settle(TOLERANCE)
+    apart = np.linalg.norm(resting.displacements - damped.displacements, axis=1).max()
+    print(f"{element}: {told}, {apart:.2e} m from the damped motion")
+    assert told.at_rest and told.status == "ok" and told.remaining < TOLERANCE and apart < TOLERANCE
+    assert resting.time == 0.0 and np.all(resting.velocities == 0.0)
+
+
+@pytest.mark.parametrize("method", ["exact", "long", "auto"])
+def test_steps_go_on_from_rest(method):
+    simulation = held(method=method, damping=20.0)
+    simulation.advance(0.05)
+    assert simulation.settle(TOLERANCE).at_rest
+    before = simulation.displacements.copy()
+    reports = [simulation.advance(0.05) for _ in range(6)]
+    assert reports[-1].ok and np.abs(simulation.displacements - before).max() < 2 * TOLERANCE
+
+
+def test_what_does_not_come_to_rest_says_so():
+    told = held().settle(TOLERANCE, most_steps=20)
+    assert not told.at_rest and told.status == "behind" and told.steps == 20
+    mesh = bar(cells=(2, 2, 4))
+    scene = supple.Scene(mesh, supple.Material.from_moduli(3_000.0, 0.45, density=1000.0))
+    free = supple.Simulation(scene, gravity=GRAVITY)
+    with pytest.warns(RuntimeWarning, match="free"):
+        assert not free.settle(TOLERANCE, most_steps=300).at_rest
+    for metre in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(supple.InputError, match="settle to within"):
+            held().settle(metre)
+    with pytest.raises(supple.InputError, match="most_steps"):
+        held().settle(TOLERANCE, most_steps=0)
+
+
+def test_displacements_can_be_set():
+    resting = held()
+    resting.settle(TOLERANCE)
+    other = held(damping=20.0)
+    other.set_displacements(resting.displacements)
+    assert np.array_equal(other.displacements, resting.displacements)
+    other.advance(0.1)
+    assert np.abs(other.displacements - resting.displacements).max() < 2 * TOLERANCE
+    wrong = resting.displacements.copy()
+    wrong[7, 1] = np.nan
+    for bad in (wrong, wrong[1:], wrong[:, :2]):
+        with pytest.raises(supple.InputError, match="displacements"):
+            other.set_displacements(bad)
+
+
+def test_a_free_body_shrinks_under_a_pressure_by_its_bulk_modulus():
+    mesh = bar(cells=(3, 3, 6))
+    material = supple.Material.from_moduli(3_000.0, 0.3, density=1000.0)
+    simulation = supple.Simulation(supple.Scene(mesh, material, element="nodal-pressure"))
+    pressure = simulation.add_pressure(mesh.boundary(), 25.0)
+    volume = pressure.volume
+    simulation._is_warned = True
+    assert simulation.settle(1e-7).at_rest
+    bulk = 3_000.0 / (3.0 * (1.0 - 2.0 * 0.3))
+    found = 1.0 - pressure.volume / volume
+    print(f"{found:.6f} of {25.0 / bulk:.6f}")
+    assert abs(found / (25.0 / bulk) - 1.0) < 0.01
+    pressure.fill(0.99 * volume, 10 * bulk)
+    pressure.pascal = 0.0
+    assert pressure.pascal == 0.0
+    assert simulation.settle(1e-7).at_rest
+    missing = 1.0 - pressure.volume / (0.99 * volume)
+    print(f"filled to {pressure.volume / volume:.5f}, {pressure.now:.2f} Pa")
+    # The tissue pushes back with its own bulk modulus.
+    assert abs(pressure.now / (0.01 * bulk * 10 / 11) - 1.0) < 0.02
+    assert abs(-10 * bulk * missing / pressure.now - 1.0) < 1e-3
+    for wrong in ((0.0, 1.0), (1e-5, -1.0), (np.nan, 1.0)):
+        with pytest.raises(supple.InputError, match="fill"):
+            pressure.fill(*wrong)
+    pressure.fill(0.0, 0.0)
+    simulation.settle(1e-7)
+    assert abs(pressure.volume / volume - 1.0) < 1e-5
+
+
+def test_pressures_are_added_changed_and_cleared():
+    simulation = held(damping=20.0)
+    mesh = simulation.scene.mesh
+    triangles = mesh.boundary()
+    low = triangles[(mesh.points[triangles][:, :, 0] < 1e-6).all(axis=1)]
+    high = triangles[(mesh.points[triangles][:, :, 0] > mesh.points[:, 0].max() - 1e-6).all(axis=1)]
+    first, second = simulation.add_pressure(low, 20.0, ramp=0.1), simulation.add_pressure(high, 20.0)
+    second.set(5.0, ramp=0.1)
+    assert (first.pascal, second.pascal) == (20.0, 5.0)
+    assert simulation.advance(0.5).ok
+    for triangles, pascal in ((low, np.nan), (low.ravel(), 1.0), (np.array([[0, 1, 10_000]]), 1.0)):
+        with pytest.raises(supple.InputError):
+            simulation.add_pressure(triangles, pascal)
+    with pytest.raises(supple.InputError, match="pressure"):
+        first.pascal = np.inf
+    second.pascal = 1e20
+    with pytest.raises(supple.Diverged, match="pressure"):
+        simulation.advance(0.1)
+    simulation.clear_pressures()
+    simulation.stop()
+    assert simulation.advance(0.1).ok
+    with pytest.raises(supple.InputError, match="no more"):
+        first.pascal = 1.0
