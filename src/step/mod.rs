@@ -11,7 +11,7 @@ mod heat;
 mod length;
 mod parts;
 mod pressure;
-mod pulls;
+pub(crate) mod pulls;
 mod status;
 pub(crate) mod threads;
 mod triangles;

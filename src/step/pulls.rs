@@ -8,7 +8,7 @@ use crate::pulls::{Pull, Pulls};
 use crate::simd::NodeVector;
 
 /// The most that a pull moves its point in an exact step, as a share of the size of a node's tissue.
-const MOST_WAY: f32 = 0.02;
+pub(crate) const MOST_WAY: f32 = 0.02;
 /// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below
 /// which they are not again.
 const SWEEPS: usize = 3;
@@ -26,9 +26,10 @@ struct Point {
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
-    /// Adds the forces of pulls at the end of an exact step to the total forces. Gives their work, J.
+    /// Adds the forces of pulls at the end of an exact step to the total forces; none moves its point by more than a share
+    /// `most_way` of the size of a node's tissue. Gives their work, J.
     #[inline(never)]
-    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>) -> f32 {
+    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> f32 {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let end = self.progress.time + f64::from(step.seconds());
         self.pulls.fill(NodeVector::ZERO);
@@ -44,7 +45,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     .nodes_of(pull)
                     .first()
                     .map_or(0.0, |pulled| self.scene.node_mass(pulled.node as usize) / density);
-                let change = point.without_tearing(change, volume);
+                let change = point.without_tearing(change, most_way * most_way * most_way * volume);
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);
                 if sweep < SWEEPS && change != Vec3::ZERO {
@@ -104,17 +105,16 @@ impl<M: ElementMaterial> Trial<'_, M> {
 }
 
 impl Point {
-    /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, a share of the
-    /// size of a node's volume (m^3), or no farther than it moves by itself.
+    /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, the edge of
+    /// this volume (m^3), or no farther than it moves by itself.
     fn without_tearing(&self, change: Vec3, volume: f32) -> Vec3 {
         let (free, way) = (self.next, self.compliance * change);
         let square = (free + way).length_squared();
         // Without a root where there is nothing to be done, as this is for every pull in every step.
-        const CUBE: f32 = MOST_WAY * MOST_WAY * MOST_WAY;
-        if square * square * square <= CUBE * CUBE * volume * volume || square <= free.length_squared() {
+        if square * square * square <= volume * volume || square <= free.length_squared() {
             return change;
         }
-        let most = (MOST_WAY * libm::cbrtf(volume)).max(free.length());
+        let most = libm::cbrtf(volume).max(free.length());
         // |free + share way| = most
         let (product, length) = (free.dot(way), way.length_squared());
         let rest = product * product + length * (most * most - free.length_squared()).max(0.0);

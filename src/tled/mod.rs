@@ -40,6 +40,7 @@ use crate::material::Material;
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
+use crate::step::pulls::MOST_WAY;
 use crate::step::{
     self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Moving, Status, Step, StepMethod, Threads, Totals,
     Trial, move_in_parts, nodal_volumes, write_volumes,
@@ -101,7 +102,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
         if is_pulled {
-            let work = trial.pull(step, self);
+            let work = trial.pull(step, self, MOST_WAY);
             let all = 0..trial.scene.node_count();
             totals = total(all, trial.increment, trial.force);
             totals.add_work(work);

@@ -10,6 +10,9 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{Cause, Computed, Forcing, Moving, Step, StepMethod, Threads, Totals, Trial, move_in_parts, moved};
 
+/// As that of exact steps ([`crate::step::pulls`]); here no inertia carries on what a pull has begun.
+const MOST_WAY: f32 = 0.1;
+
 /// Puts the nodes where the kinetic energy was largest, half a step before the last but one, at a stop.
 pub(super) fn go_back<M: ElementMaterial>(
     scene: SceneView<'_, M>,
@@ -122,7 +125,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
         let sums_of = |nodes, force: &[NodeVector], _: &mut [()]| own.sums(nodes, inertia, increment, force);
         let (sums, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, sums_of);
         let mut totals = Totals::of_all(&sums);
-        totals.add_work(trial.pull(self.step, self));
+        totals.add_work(trial.pull(self.step, self, MOST_WAY));
         if trial.loads.pulls().is_some() {
             let Trial { increment, force, .. } = &*trial;
             totals.replace_sums(&own.sums(0..inertia.len(), inertia, increment, force));

@@ -119,3 +119,34 @@ fn absent_pulls_change_no_bit() {
     assert!(alone.iter().any(|vector| vector.to_array()[1] < -1e-3));
     assert_eq!(alone, moved(2));
 }
+
+/// Dynamic relaxation has masses of its own, and comes to where damped exact steps do.
+#[test]
+fn settling_comes_to_rest_where_damped_steps_do() {
+    let at_rest = |settles: bool| {
+        let mut body = bar(Element::NodalStrain, false).with(settings(Method::Exact, 20.0, None));
+        for (at, target) in [
+            ([0.015, 0.0, 0.11], [0.03, 0.0, 0.105]),
+            ([0.0, 0.015, 0.06], [0.004, 0.02, 0.06]),
+            ([0.03, 0.03, 0.0], [0.03, 0.03, 0.0]),
+            ([0.0, 0.0, 0.03], [0.0, 0.0, 0.03]),
+        ] {
+            let pull = body.pull(at, 0.012, 300.0).unwrap();
+            body.pulls[pull].put(target);
+        }
+        let mut steps = 0;
+        if settles {
+            let settled = body.settle(1e-5, 5000).unwrap();
+            assert!(settled.at_rest, "{settled:?}");
+            steps = settled.steps;
+        } else {
+            (0..40).for_each(|_| assert_eq!(body.advance(0.1).unwrap().status, supple::step::Status::Ok));
+        }
+        (body.displacements().iter().map(|vector| vector.to_array()).collect::<Vec<_>>(), steps)
+    };
+    let ((damped, _), (settled, steps)) = (at_rest(false), at_rest(true));
+    let apart = damped.iter().zip(&settled).map(|(a, b)| length([a[0] - b[0], a[1] - b[1], a[2] - b[2]]));
+    let (most, size) = (apart.fold(0.0, f32::max), damped.iter().map(|vector| length(*vector)).fold(0.0, f32::max));
+    println!("{:.5} mm apart of {:.2} mm after {steps} steps", 1e3 * most, 1e3 * size);
+    assert!(most < 2e-5 && size > 0.005);
+}
