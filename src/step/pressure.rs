@@ -42,8 +42,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     let free = Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO);
                     let last = Vec4::from(increment.0);
                     way += Vec4::select(free, 0.5 * (next + last), last);
-                    least = least.min(method.inertia_of(node, inertia).mass);
-                    tissue = tissue.min(inertia.mass);
+                    // What is held does not tear.
+                    if free.any() {
+                        least = least.min(method.inertia_of(node, inertia).mass);
+                        tissue = tissue.min(inertia.mass);
+                    }
                 }
                 work += f64::from(newton.dot(way.truncate()));
                 let far = push * newton.length() / least;
