@@ -23,7 +23,7 @@
 //! [`crate::tled::critical_step`] knows nothing of it: pressures up to a tenth of Young's modulus are within the margin
 //! that exact steps have. A pressure that moves a node by more than the size of its tissue in one step is refused.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 #[cfg(any(feature = "std", test))]
 use crate::loads::Loads;
@@ -84,9 +84,10 @@ impl PressedTriangle {
     }
 
     /// Where the first corner is, and the others from there, m.
+    #[inline(always)]
     fn placed(&self, displacement: &[NodeVector]) -> [Vec3; 3] {
         let moved = |node: u32| {
-            displacement.get(node as usize).map_or(Vec3::ZERO, |NodeVector(moved)| Vec4::from(*moved).truncate())
+            displacement.get(node as usize).map_or(Vec3::ZERO, |&NodeVector([x, y, z, _])| Vec3::new(x, y, z))
         };
         let [a, b, c] = self.nodes.map(moved);
         let [to_b, to_c] = self.edges.map(Vec3::from_array);
@@ -168,14 +169,16 @@ impl<'a> Pressure<'a> {
 
     /// The same: negative for a cavity, whose triangles face inward.
     fn signed_volume(&self, surface: usize, displacement: &[NodeVector]) -> f64 {
-        let own = self.triangles.iter().filter(|triangle| triangle.surface as usize == surface);
-        // From a point near all of them, so that nothing cancels.
-        let origin = own.clone().next().map_or(Vec3::ZERO, |triangle| triangle.placed(displacement)[0]);
-        own.map(|triangle| {
-            let [a, to_b, to_c] = triangle.placed(displacement);
-            f64::from((a - origin).dot(to_b.cross(to_c))) / 6.0
-        })
-        .sum()
+        let (mut origin, mut sum) = (None, 0.0);
+        for triangle in self.triangles {
+            if triangle.surface as usize == surface {
+                let [a, to_b, to_c] = triangle.placed(displacement);
+                // From a point near all of them, so that nothing cancels.
+                let from = *origin.get_or_insert(a);
+                sum += f64::from((a - from).dot(to_b.cross(to_c)));
+            }
+        }
+        sum / 6.0
     }
 
     /// The pressure on a surface at `time` (s) and these displacements (m), Pa: with what it takes to fill it.

@@ -169,7 +169,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// How far a force (N) by itself moves a node in this step, m.
-    pub(super) fn way_of(&self, step: &Step, method: &impl StepMethod<M>, node: usize, newton: f64) -> f64 {
+    fn way_of(&self, step: &Step, method: &impl StepMethod<M>, node: usize, newton: f64) -> f64 {
         let seconds = f64::from(step.seconds());
         let mass = self.scene.inertia.get(node).map_or(0.0, |inertia| method.inertia_of(node, inertia).mass);
         newton * seconds * seconds / (f64::from(1.0 + method.added_inertia()) * f64::from(mass))

@@ -1,10 +1,12 @@
 //! Pressures that follow the surface in a step ([`crate::pressure`]): their work, and whether one tears the tissue.
 
-use glam::Vec3;
+use glam::Vec4;
 
-use super::contact::{axes, mean};
 use super::{Cause, Step, StepMethod, Totals, Trial};
 use crate::element::ElementMaterial;
+
+/// Triangles that meet at a node of a surface, more or less.
+const AROUND: f32 = 6.0;
 
 impl<M: ElementMaterial> Trial<'_, M> {
     /// Enters the work of the pressures. The step is refused if one moves a node through the tissue around it.
@@ -20,41 +22,42 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let Self { scene, loads, displacement, increment, force, progress, .. } = self;
         let (Some(pressure), time) = (loads.pressure(), progress.time) else { return };
         let (mut work, mut torn) = (0.0, None);
+        let density = scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density);
+        // What the forces of the triangles around a node, each as large as one of them, move it by for each kilogram.
+        let push = AROUND * step.seconds() * step.seconds() / (1.0 + method.added_inertia());
         pressure.each(
             time,
             displacement,
             |_| true,
             |nodes, newton, surface| {
-                let mut way = Vec3::ZERO;
-                for node in nodes {
-                    let at = node as usize;
+                let (mut way, mut least, mut tissue) = (Vec4::ZERO, f32::INFINITY, f32::INFINITY);
+                for node in nodes.map(|node| node as usize) {
                     let (Some(inertia), Some(increment), Some(force)) =
-                        (scene.inertia.get(at), increment.get(at), force.get(at))
+                        (scene.inertia.get(node), increment.get(node), force.get(node))
                     else {
                         continue;
                     };
-                    let next = method.next_increment(at, inertia, increment, force);
-                    let free = Vec3::from_array(inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 }));
-                    let last = axes(increment.0);
-                    way += free * mean(next, increment.0) + (Vec3::ONE - free) * last;
-                    let square = (free * (axes(next) - last)).length_squared();
-                    let volume = scene.node_volume(at);
-                    // Without a root.
-                    if square * square * square > volume * volume {
-                        torn = torn.or(Some((node, surface)));
+                    let next = Vec4::from(method.next_increment(node, inertia, increment, force));
+                    let [x, y, z] = inertia.inverse;
+                    let free = Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO);
+                    let last = Vec4::from(increment.0);
+                    way += Vec4::select(free, 0.5 * (next + last), last);
+                    // What is held does not tear.
+                    if free.any() {
+                        least = least.min(method.inertia_of(node, inertia).mass);
+                        tissue = tissue.min(inertia.mass);
                     }
                 }
-                work += f64::from(newton.dot(way));
+                work += f64::from(newton.dot(way.truncate()));
+                let far = push * newton.length() / least;
+                if far * far * far * density > tissue {
+                    torn = torn.or(Some((nodes[0], surface)));
+                }
             },
         );
         totals.add_work_of_loads(work);
-        let Some((node, surface)) = torn else { return };
-        // Only if it does so by itself: something else may have thrown the node.
-        let mut newton = Vec3::ZERO;
-        pressure.each(time, displacement, |nodes| nodes.contains(&node), |_, of_triangle, _| newton += of_triangle);
-        let (size, pascal) = (scene.node_size(node as usize), pressure.pascal(surface, time, displacement));
-        let way = self.way_of(step, method, node as usize, newton.length().into());
-        if way > f64::from(size) {
+        if let Some((node, surface)) = torn {
+            let (size, pascal) = (scene.node_size(node as usize), pressure.pascal(surface, time, displacement));
             self.refused.get_or_insert((node, Cause::Pressure { surface, pascal, size }));
         }
     }
