@@ -1,5 +1,6 @@
 """The examples as a user runs them: the notebook-like one, and the data set over processes, killed and started again."""
 
+import re
 import subprocess
 import sys
 import time
@@ -20,6 +21,24 @@ def test_a_ball_on_a_lobe_makes_its_picture(tmp_path):
     picture = imread(tmp_path / "press-lobe.png")
     assert len(np.unique((255 * picture[..., :3]).astype(int).reshape(-1, 3), axis=0)) > 1000
     assert (tmp_path / "pressed.vtu").stat().st_size > 100_000
+
+
+def test_a_ct_follows_tracked_points(tmp_path):
+    said = subprocess.run(
+        [sys.executable, ROOT / "examples" / "register_ct.py", ROOT / "meshes" / "lobe.msh", tmp_path],
+        check=True, capture_output=True, text=True,
+    ).stdout
+    print(said)
+    found = re.findall(r"^(\d+) points: rigid ([\d.]+), thin-plate spline ([\d.]+), supple ([\d.]+); .* ok$", said, flags=re.M)
+    errors = {int(count): [float(error) for error in row] for count, *row in found}
+    assert sorted(errors) == [6, 10, 20]
+    for rigid, spline, own in errors.values():
+        assert own < 0.7 * rigid and own < 1.1 * spline
+    wrong, gap, others = map(float, re.search(r"15 mm off: ([\d.]+) mm; its gap ([\d.]+) mm, others at most ([\d.]+)", said).groups())
+    assert wrong < 1.2 * errors[20][2] and gap > 3.0 * others
+    off, before = map(float, re.search(r"true one: ([\d.]+) of ([\d.]+)", said).groups())
+    assert off < 0.25 * before
+    assert {path.name for path in tmp_path.iterdir()} == {"ct.nii.gz", "ct-now.nii.gz", "ct-now.h5", "register-ct.png"}
 
 
 def organs(folder, count):
