@@ -15,12 +15,14 @@ mod convert;
 mod demo;
 pub mod element_name;
 mod field;
+mod fit;
 #[cfg(test)]
 mod hostile;
 mod inspect;
 mod moved;
 pub mod problem;
 pub mod report;
+mod rest;
 mod results;
 mod run;
 pub mod scene;
@@ -75,6 +77,7 @@ enum Command {
     },
     /// Make the signed distances of a closed surface, for an instrument of any form
     Field(field::Asked),
+    Fit(fit::Asked),
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
     Weights(convert::Conversion),
@@ -94,6 +97,7 @@ pub fn main() -> ExitCode {
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Field(asked) => field::make(&asked),
+        Command::Fit(asked) => fit::fit(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
         Command::Evaluate(_) => moved::refuse("evaluate", "methods|physics|hard|tolerance --out DIR"),
         Command::Train(_) => moved::refuse("train", "train RECIPE --out FILE"),
