@@ -9,6 +9,7 @@ mod interrupted;
 mod learned;
 mod screen;
 mod simulate;
+mod unloaded;
 mod weights;
 
 #[path = "../support/networks.rs"]

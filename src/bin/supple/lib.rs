@@ -28,6 +28,7 @@ mod run;
 pub mod scene;
 pub mod screen;
 mod simulate;
+mod unloaded;
 pub mod weight_file;
 
 use std::path::PathBuf;
@@ -78,6 +79,7 @@ enum Command {
     /// Make the signed distances of a closed surface, for an instrument of any form
     Field(field::Asked),
     Fit(fit::Asked),
+    Unloaded(unloaded::Asked),
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
     Weights(convert::Conversion),
@@ -98,6 +100,7 @@ pub fn main() -> ExitCode {
         Command::Demo { out } => demo::demo(&out),
         Command::Field(asked) => field::make(&asked),
         Command::Fit(asked) => fit::fit(&asked),
+        Command::Unloaded(asked) => unloaded::unloaded(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
         Command::Evaluate(_) => moved::refuse("evaluate", "methods|physics|hard|tolerance --out DIR"),
         Command::Train(_) => moved::refuse("train", "train RECIPE --out FILE"),
