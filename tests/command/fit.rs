@@ -70,7 +70,7 @@ fn young_comes_back_from_another_mesh_with_noise() {
     let (value, error) = (young["value"].as_f64().unwrap(), young["standard_error"].as_f64().unwrap());
     println!("{}{result:#}", said.out);
     // The coarser mesh is some per cent stiffer or softer.
-    assert!((value / YOUNG - 1.0).abs() < 0.05, "{value} of {YOUNG}");
+    assert!((value / YOUNG - 1.0).abs() < 0.07, "{value} of {YOUNG}");
     assert!(error > 1e-4 * value && error < 0.02 * value, "{error}");
     assert!(young["told"].as_bool().unwrap() && result["converged"].as_bool().unwrap());
     assert!(result["simulations"].as_u64().unwrap() <= 6, "{}", result["simulations"]);

@@ -15,16 +15,18 @@ From a mesh to a deformed one, in ten lines:
 
 from ._library import lib as _lib
 from .errors import Diverged, Error, InputError, UnstableStep
+from .fitting import Fit, fit
 from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
 from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
+from .shape import Unloaded, unloaded
 from .simulation import METHODS, Report, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls", "Reaction", "ReactionForce", "Report",
-    "Scene", "Simulation", "Touch", "UnstableStep", "level", "version",
+    "METHODS", "Diverged", "Error", "Fit", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls", "Reaction", "ReactionForce", "Report",
+    "Scene", "Simulation", "Touch", "Unloaded", "UnstableStep", "fit", "level", "unloaded", "version",
 ]
 
 
