@@ -17,8 +17,10 @@ const LOOK: f64 = 10.0;
 /// The share of its peak below which the kinetic energy has passed it: less would take ripples for it.
 const PASSED: f64 = 0.7;
 /// At most so many looks before the first peak, and so many times `1 / omega` after it.
-const MOST_LOOKS: u32 = 20_000;
-const MOST_SPANS: u32 = 400;
+const MOST_LOOKS: u32 = 5_000;
+const MOST_SPANS: u32 = 100;
+/// Steps over those at the critical step of the start, at most: tissue that collapses takes ever shorter ones.
+const MOST_STEPS: f64 = 10.0;
 
 /// Why a body did not come to rest.
 pub(crate) enum Unrest {
@@ -26,6 +28,8 @@ pub(crate) enum Unrest {
     Problem(Problem),
     /// A step was refused.
     Diverged(Divergence),
+    /// The tissue is crushed, so that steps become too short to go on.
+    Crushed,
     /// It still moves after all the time that there is, by so many metres in `1 / omega`.
     Moves(f64),
 }
@@ -44,6 +48,10 @@ impl Unrest {
             Self::Diverged(divergence) => Problem(format!(
                 "{name}: on the way to rest the simulation {divergence}; make the tissue stiffer or the loads smaller"
             )),
+            Self::Crushed => Problem(format!(
+                "{name}: on the way to rest the loads crush the tissue, and steps become {MOST_STEPS} times shorter; make the tissue stiffer \
+                 or the loads smaller"
+            )),
             Self::Moves(metres) => Problem(format!(
                 "{name}: the body does not come to rest, it still moves by {:.3} mm; is it held at all?",
                 1e3 * metres
@@ -58,7 +66,7 @@ impl Unrest {
 pub(crate) fn at_rest(setup: &Setup, from: Option<&[[f32; 3]]>, metre: f64) -> Result<Vec<[f32; 3]>, Unrest> {
     let mut resting = Resting::new(setup, from)?;
     let Some(omega) = resting.frequency(metre)? else { return Ok(resting.displacements()) };
-    resting.simulation.set(exact(2.0 * omega as f32));
+    resting.damping = 2.0 * omega as f32;
     let (mut latest, mut before) = (resting.displacements(), f64::INFINITY);
     for _ in 0..MOST_SPANS {
         resting.advance(1.0 / omega)?;
@@ -75,10 +83,6 @@ pub(crate) fn at_rest(setup: &Setup, from: Option<&[[f32; 3]]>, metre: f64) -> R
     Err(Unrest::Moves(before))
 }
 
-fn exact(damping: f32) -> Settings<'static> {
-    Settings { method: Method::Exact, damping, ..Settings::default() }
-}
-
 /// The largest distance (m) between two sets of places.
 pub(crate) fn largest_distance(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     let square = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|axis| f64::from(a[axis] - b[axis]).powi(2)).sum::<f64>();
@@ -88,6 +92,10 @@ pub(crate) fn largest_distance(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
 struct Resting<'a> {
     setup: &'a Setup,
     simulation: Simulation<'a>,
+    /// Of the start, s.
+    critical: f64,
+    /// 1/s.
+    damping: f32,
 }
 
 impl<'a> Resting<'a> {
@@ -99,13 +107,13 @@ impl<'a> Resting<'a> {
             ))));
         }
         let mut simulation = setup.simulation()?;
-        simulation.set(exact(0.0));
+        let critical = simulation.critical_step().map_err(Problem::of)?;
         // Loads act in full from the start, but supports move there: at once they would tear the tissue.
         let ramp = f64::from(setup.longest_ramp());
         let start = if setup.motions.is_empty() { ramp } else { 0.0 };
         let at = |node: usize| [from.map_or([0.0; 3], |from| from[node]), [0.0; 3]];
         simulation.state_mut().view().put(start, 0.0, at);
-        let mut resting = Self { setup, simulation };
+        let mut resting = Self { setup, simulation, critical: critical.seconds.into(), damping: 0.0 };
         if ramp > start {
             resting.advance(ramp)?;
         }
@@ -114,20 +122,24 @@ impl<'a> Resting<'a> {
 
     /// Moves on by so many seconds.
     fn advance(&mut self, seconds: f64) -> Result<(), Unrest> {
-        let Self { setup, simulation } = self;
+        let Self { setup, simulation, critical, damping } = self;
+        let most_steps = Some((MOST_STEPS * (seconds / *critical).max(MOST_STEPS)) as u32);
+        if simulation.settings().damping != *damping || simulation.settings().most_steps != most_steps {
+            simulation.set(Settings { method: Method::Exact, damping: *damping, most_steps, ..Settings::default() });
+        }
         let mut loads = setup.loads(simulation.scene())?;
         let until = simulation.state().time() + seconds;
         let report = simulation.advance_under(until, &mut loads, &mut |_: Event<'_>| {}).map_err(Problem::of)?;
         match report.status {
             Status::Diverged(divergence) => Err(Unrest::Diverged(divergence)),
+            Status::Behind { .. } => Err(Unrest::Crushed),
             _ => Ok(()),
         }
     }
 
     /// The lowest frequency (1/s) by the first peak of the kinetic energy; none if nothing moves.
     fn frequency(&mut self, metre: f64) -> Result<Option<f64>, Unrest> {
-        let step = self.simulation.critical_step().map_err(Problem::of)?;
-        let span = LOOK * f64::from(step.seconds);
+        let span = LOOK * self.critical;
         let start = (self.displacements(), self.simulation.state().time());
         let (mut peak, mut peaked) = (0.0, 0.0);
         for _ in 0..MOST_LOOKS {

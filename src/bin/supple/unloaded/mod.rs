@@ -42,6 +42,8 @@ const REST: f64 = 0.1;
 /// A step that turns elements inside out, or under which the body does not come to rest, is taken in part: at least
 /// such a share of it.
 const LEAST_SHARE: f64 = 1.0 / 16.0;
+/// Of all steps together at most so many are refused: each costs more than one that is not.
+const MOST_REFUSED: u32 = 6;
 
 /// What became of the search.
 struct Found {
@@ -120,15 +122,15 @@ impl Search {
             .map(|(at, moved)| [0, 1, 2].map(|axis| at[axis] + f64::from(moved[axis])))
             .collect();
         let mut tried: Option<Vec<[f64; 3]>> = None;
-        let (mut mixture, mut share, mut best) = (Mixture::new(), 1.0, f64::INFINITY);
+        let (mut mixture, mut share, mut best, mut refused) = (Mixture::new(), 1.0, f64::INFINITY, 0);
         while self.simulations < MOST_SIMULATIONS {
             let gaps = match self.gaps(&points)? {
                 Some(gaps) => gaps,
                 None => {
                     // Back towards the last place that could be simulated.
-                    share *= 0.5;
+                    (share, refused) = (0.5 * share, refused + 1);
                     let from = tried.as_ref().unwrap_or(&self.image);
-                    if share < LEAST_SHARE {
+                    if share < LEAST_SHARE || refused > MOST_REFUSED {
                         return Err(self.refused(best));
                     }
                     points = between(from, &points, 0.5);
@@ -182,8 +184,8 @@ impl Search {
         };
         let shape = match found {
             Ok(shape) => shape,
-            Err(Unrest::Diverged(_)) => return Ok(None),
-            Err(unrest) => return Err(unrest.of(&self.setup.body.name)),
+            Err(Unrest::Diverged(_) | Unrest::Crushed | Unrest::Moves(_)) => return Ok(None),
+            Err(Unrest::Problem(problem)) => return Err(problem),
         };
         let gap = |((from, moved), to): ((&[f64; 3], &[f32; 3]), &[f64; 3])| {
             [0, 1, 2].map(|axis| from[axis] + f64::from(moved[axis]) - to[axis])
@@ -207,7 +209,7 @@ impl Search {
         match shape {
             Ok(shape) => Ok(shape),
             // Then from the image on.
-            Err(Unrest::Diverged(_)) => Ok(vec![[0.0; 3]; self.image.len()]),
+            Err(Unrest::Diverged(_) | Unrest::Crushed) => Ok(vec![[0.0; 3]; self.image.len()]),
             Err(unrest) => Err(unrest.of(&self.setup.body.name)),
         }
     }
