@@ -53,7 +53,7 @@ class Fit:
     converged: bool
 
     def __str__(self) -> str:
-        lines = [f"{name:<21} {value:.4g}, standard error {self.standard_errors[name]:.2g}" for name, value in self.values.items()]
+        lines = [f"{name:<21} {_short(value)}, standard error {_short(self.standard_errors[name])}" for name, value in self.values.items()]
         lines.append(f"{'residuals':<21} {1e3 * self.rms:.2f} mm rms, worst {1e3 * self.worst:.2f} mm at point {self.worst_point}")
         known = self.each_left_out[np.isfinite(self.each_left_out)]
         if len(known) > 1:
@@ -62,6 +62,11 @@ class Fit:
             lines.append(f"{'left out':<21} {1e3 * self.left_out_rms:.2f} mm rms, worst {1e3 * self.left_out_worst:.2f} mm")
         lines.append(f"{'simulations':<21} {self.simulations}")
         return "\n".join([*lines, *self.cannot_tell])
+
+
+def _short(value: float) -> str:
+    """Four digits, without an exponent."""
+    return str(np.format_float_positional(value, precision=4, fractional=False, trim="-"))
 
 
 def fit(
