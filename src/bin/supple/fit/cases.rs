@@ -29,6 +29,8 @@ pub(crate) struct Case {
     /// Which samples are not fitted.
     pub(crate) left_out: Vec<bool>,
     points: Vec<Followed>,
+    /// Of the scene as it is written.
+    warnings: Vec<String>,
     /// How much of the way to rest may be left, m.
     pub(crate) rest: f64,
 }
@@ -56,6 +58,7 @@ impl<'a> Cases<'a> {
             return Err(Problem(format!("{}: all points are left out; what is to be fitted?", cases.all[0].name)));
         }
         for case in &cases.all {
+            cases.warnings.extend(case.warnings.iter().cloned());
             let outside = case.points.iter().filter_map(|point| point.outside).fold(0.0, f64::max);
             if outside > 0.0 {
                 let most = 1e3 * outside;
@@ -156,7 +159,16 @@ impl Case {
         let squares: Vec<f64> = measured.map(|metre| metre * metre).collect();
         let rest = (REST * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()).max(LEAST_REST);
         let name = table.scene.get_ref().display().to_string();
-        Ok(Self { name, file, scene: table.scene.get_ref().clone(), samples, left_out, points, rest })
+        Ok(Self {
+            name,
+            file,
+            scene: table.scene.get_ref().clone(),
+            samples,
+            left_out,
+            points,
+            warnings: setup.warnings,
+            rest,
+        })
     }
 
     /// Displacements of the samples at their times, from rest and by the method of the scene.
