@@ -50,7 +50,8 @@ pub(crate) struct Solution {
 pub(crate) fn solve(unknowns: &[Unknown], noise: f64, residuals: &mut Residuals<'_>) -> Result<Solution, Problem> {
     let axes: Vec<Axis> = unknowns.iter().map(Axis::new).collect();
     let start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    let first = residuals(&start)?;
+    let at_start = |problem| Problem(format!("with the start values: {problem}"));
+    let first = residuals(&start).map_err(at_start)?;
     let refused = first.map(|residual| REFUSED * (residual.abs() + 1.0));
     let mut here = Point {
         x: DVector::from_iterator(axes.len(), axes.iter().zip(&start).map(|(axis, value)| axis.x(*value))),
