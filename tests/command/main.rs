@@ -1,6 +1,7 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
 mod demo;
 mod errors;
+mod fit;
 mod inertia;
 mod inspect;
 mod instruments;
@@ -9,6 +10,7 @@ mod learned;
 mod pulls;
 mod screen;
 mod simulate;
+mod unloaded;
 mod weights;
 
 #[path = "../support/networks.rs"]

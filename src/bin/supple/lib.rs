@@ -15,17 +15,20 @@ mod convert;
 mod demo;
 pub mod element_name;
 mod field;
+mod fit;
 #[cfg(test)]
 mod hostile;
 mod inspect;
 mod moved;
 pub mod problem;
 pub mod report;
+mod rest;
 mod results;
 mod run;
 pub mod scene;
 pub mod screen;
 mod simulate;
+mod unloaded;
 pub mod weight_file;
 
 use std::path::PathBuf;
@@ -75,6 +78,8 @@ enum Command {
     },
     /// Make the signed distances of a closed surface, for an instrument of any form
     Field(field::Asked),
+    Fit(fit::Asked),
+    Unloaded(unloaded::Asked),
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
     Weights(convert::Conversion),
@@ -97,6 +102,8 @@ pub fn main() -> ExitCode {
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Field(asked) => field::make(&asked),
+        Command::Fit(asked) => fit::fit(&asked),
+        Command::Unloaded(asked) => unloaded::unloaded(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
         Command::Warp(given) => moved::say_python(&given),
         Command::Evaluate(_) => moved::refuse("evaluate", "methods|physics|hard|tolerance --out DIR"),

@@ -15,6 +15,7 @@ From a mesh to a deformed one, in ten lines:
 
 from ._library import lib as _lib
 from .errors import Diverged, Error, InputError, UnstableStep
+from .fitting import Fit, fit
 from .images import Field, Grid, displacement_field, read_image, write_image
 from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
@@ -22,12 +23,13 @@ from .points import FollowedPoints
 from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
+from .shape import Unloaded, unloaded
 from .simulation import METHODS, Pressure, Report, Settled, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "Field", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pressure",
-    "Pulls", "Reaction", "ReactionForce", "Report", "Scene", "Settled", "Simulation", "Touch", "UnstableStep", "displacement_field", "level",
-    "read_image", "version", "write_image",
+    "METHODS", "Diverged", "Error", "Field", "Fit", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh",
+    "Pressure", "Pulls", "Reaction", "ReactionForce", "Report", "Scene", "Settled", "Simulation", "Touch", "Unloaded", "UnstableStep",
+    "displacement_field", "fit", "level", "read_image", "unloaded", "version", "write_image",
 ]
 
 

@@ -161,6 +161,11 @@ impl SceneFile {
     pub fn read(path: &Path) -> Result<Self, Problem> {
         let text =
             supple::io::read_text(path).map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))?;
+        Self::of_text(path, text)
+    }
+
+    /// A scene file with this text in place of what it holds.
+    pub(crate) fn of_text(path: &Path, text: String) -> Result<Self, Problem> {
         let scene = toml::from_str(&text).map_err(|error: toml::de::Error| {
             let line = error.span().map(|span| format!(", line {}", line_of(&text, span.start)));
             Problem(format!("{}{}: {}", path.display(), line.unwrap_or_default(), error.message()))
@@ -171,6 +176,11 @@ impl SceneFile {
     /// A complaint about something in the file.
     pub(crate) fn problem<T>(&self, at: &Spanned<T>, message: impl fmt::Display) -> Problem {
         Problem(format!("{}: {message}", self.place(at)))
+    }
+
+    /// What it holds.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
     }
 
     /// Where it is.
@@ -216,6 +226,6 @@ impl SceneFile {
     }
 }
 
-fn line_of(text: &str, at: usize) -> usize {
+pub(crate) fn line_of(text: &str, at: usize) -> usize {
     text.as_bytes().iter().take(at).filter(|byte| **byte == b'\n').count() + 1
 }

@@ -180,6 +180,12 @@ impl Setup {
         Ok(loads)
     }
 
+    /// The longest time over which a load rises, s.
+    pub(crate) fn longest_ramp(&self) -> f32 {
+        let forces = self.forces.iter().map(|force| force.ramp);
+        forces.chain(self.motions.iter().map(|motion| motion.ramp)).fold(0.0, f32::max)
+    }
+
     /// What acts on the scene.
     pub fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
         let loads = Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)?;

@@ -1,0 +1,191 @@
+//! What a fit compares: scenes with values put into them, moved, and the displacements of their measured points. A
+//! scene whose values have not changed is not simulated again.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use super::file::{CaseTable, FitFile, LeftOut, Unknown};
+use super::measured::{self, Sample};
+use super::place::{Edit, edited};
+use super::points::Followed;
+use crate::problem::Problem;
+use crate::rest::{Unrest, at_rest, displacements};
+use crate::run::start::Start;
+use crate::scene::file::SceneFile;
+use crate::scene::setup::Setup;
+
+/// What may be left of the way to rest, as a share of what was measured.
+const REST: f64 = 1e-4;
+/// At least, m: displacements are float32.
+const LEAST_REST: f64 = 1e-7;
+
+/// A scene with what was measured on it.
+pub(crate) struct Case {
+    pub(crate) name: String,
+    file: SceneFile,
+    /// As the fit file names it.
+    scene: PathBuf,
+    pub(crate) samples: Vec<Sample>,
+    /// Which samples are not fitted.
+    pub(crate) left_out: Vec<bool>,
+    points: Vec<Followed>,
+    /// Of the scene as it is written.
+    warnings: Vec<String>,
+    /// How much of the way to rest may be left, m.
+    pub(crate) rest: f64,
+}
+
+/// All cases of a fit, with what has been simulated so far.
+pub(crate) struct Cases<'a> {
+    pub(crate) all: Vec<Case>,
+    unknowns: &'a [Unknown],
+    done: HashMap<(usize, String), Vec<[f64; 3]>>,
+    /// The latest states at rest, from which the next ones begin.
+    shapes: Vec<Option<Vec<[f32; 3]>>>,
+    pub(crate) simulations: u32,
+    /// Warnings of the scenes.
+    pub(crate) warnings: Vec<String>,
+}
+
+impl<'a> Cases<'a> {
+    /// Reads all that a fit file names. What is wrong with a scene, its values or its measured points is told here.
+    pub(crate) fn read(fit: &'a FitFile) -> Result<Self, Problem> {
+        let all: Vec<Case> = fit.cases.iter().map(|table| Case::read(fit, table)).collect::<Result<_, _>>()?;
+        let shapes = all.iter().map(|_| None).collect();
+        let mut cases =
+            Self { all, unknowns: &fit.unknowns, done: HashMap::new(), shapes, simulations: 0, warnings: vec![] };
+        if !cases.all.iter().any(|case| case.left_out.contains(&false)) {
+            return Err(Problem(format!("{}: all points are left out; what is to be fitted?", cases.all[0].name)));
+        }
+        for case in &cases.all {
+            cases.warnings.extend(case.warnings.iter().cloned());
+            let outside = case.points.iter().filter_map(|point| point.outside).fold(0.0, f64::max);
+            if outside > 0.0 {
+                let most = 1e3 * outside;
+                cases.warnings.push(format!(
+                    "{}: points are outside the mesh, up to {most:.1} mm from its nearest node; the nodes next to them carry them",
+                    case.name
+                ));
+            }
+        }
+        Ok(cases)
+    }
+
+    /// What a case's scene is with values in it.
+    pub(crate) fn text(&self, case: &Case, values: &[f64]) -> Result<(String, Vec<Edit>), Problem> {
+        let (mut text, mut all) = (case.file.text().to_owned(), vec![]);
+        for (unknown, value) in self.unknowns.iter().zip(values) {
+            if unknown.scene.as_ref().is_some_and(|scene| *scene != case.scene) {
+                continue;
+            }
+            let problem = |message| Problem(format!("{}: {message} (scene {})", unknown.at, case.name));
+            let mut edits = unknown.place.edits(&text, *value).map_err(problem)?;
+            text = edited(&text, &mut edits);
+            edits.reverse();
+            all.extend(edits);
+        }
+        Ok((text, all))
+    }
+
+    /// Displacements (m) of the samples of a case. Each simulation counts.
+    pub(crate) fn displacements(&mut self, index: usize, values: &[f64]) -> Result<Vec<[f64; 3]>, Problem> {
+        let case = &self.all[index];
+        let (text, _) = self.text(case, values)?;
+        let key = (index, text);
+        if let Some(done) = self.done.get(&key) {
+            return Ok(done.clone());
+        }
+        self.simulations += 1;
+        let setup = Setup::read(&SceneFile::of_text(case.file.path(), key.1.clone())?)?;
+        let found = if case.samples.iter().any(|sample| sample.time.is_some()) {
+            case.over_time(&setup)?
+        } else {
+            let from = self.shapes[index].as_deref();
+            let shape = match at_rest(&setup, from, case.rest) {
+                // From a shape of other values it may be too far.
+                Err(Unrest::Diverged(_)) if from.is_some() => at_rest(&setup, None, case.rest),
+                found => found,
+            };
+            let shape = shape.map_err(|unrest| unrest.of(&case.name))?;
+            let found = case.points.iter().map(|point| point.displacement(&shape)).collect();
+            self.shapes[index] = Some(shape);
+            found
+        };
+        self.done.insert(key, found.clone());
+        Ok(found)
+    }
+}
+
+impl Case {
+    fn read(fit: &FitFile, table: &CaseTable) -> Result<Self, Problem> {
+        let file = SceneFile::read(&fit.resolve(table.scene.get_ref()))
+            .map_err(|problem| fit.problem(&table.scene, problem))?;
+        let setup = Setup::read(&file)?;
+        let samples = measured::read(&fit.resolve(table.measured.get_ref()))
+            .map_err(|problem| fit.problem(&table.measured, problem))?;
+        let timed = samples.iter().filter(|sample| sample.time.is_some()).count();
+        if timed > 0 && !setup.instruments.is_empty() {
+            return Err(
+                fit.problem(&table.scene, "scenes with instruments cannot be fitted yet; remove [[instrument]]")
+            );
+        }
+        let mut left_out = vec![false; samples.len()];
+        match table.left_out.as_ref().map(|at| (at, at.get_ref())) {
+            None => {}
+            Some((_, LeftOut::All(all))) => left_out.fill(*all),
+            Some((at, LeftOut::Names(names))) => {
+                for name in names {
+                    if !samples.iter().any(|sample| sample.name == *name) {
+                        return Err(fit.problem(at, format!("no measured point has the name \"{name}\"")));
+                    }
+                }
+                left_out = samples.iter().map(|sample| names.contains(&sample.name)).collect();
+            }
+        }
+        let points: Vec<_> = samples.iter().map(|sample| Followed::new(&setup.body, sample.point)).collect();
+        let far = points
+            .iter()
+            .zip(&samples)
+            .find(|(point, _)| point.outside.is_some_and(|far| far > 0.5 * setup.body.diagonal()));
+        if let Some((point, sample)) = far {
+            let far = 1e3 * point.outside.unwrap_or_default();
+            let message = format!(
+                "the point {} is {far:.0} mm from the mesh; places are those of the undeformed mesh in metres",
+                sample.name
+            );
+            return Err(fit.problem(&table.measured, message));
+        }
+        let measured = samples.iter().flat_map(|sample| sample.displacement).flatten();
+        let squares: Vec<f64> = measured.map(|metre| metre * metre).collect();
+        let rest = (REST * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()).max(LEAST_REST);
+        let name = table.scene.get_ref().display().to_string();
+        Ok(Self {
+            name,
+            file,
+            scene: table.scene.get_ref().clone(),
+            samples,
+            left_out,
+            points,
+            warnings: setup.warnings,
+            rest,
+        })
+    }
+
+    /// Displacements of the samples at their times, from rest and by the method of the scene.
+    fn over_time(&self, setup: &Setup) -> Result<Vec<[f64; 3]>, Problem> {
+        let Start { mut simulation, .. } = Start::new(setup, false)?;
+        let time = |index: usize| self.samples[index].time.unwrap_or_default();
+        let mut order: Vec<usize> = (0..self.samples.len()).collect();
+        order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
+        let mut found = vec![[0.0; 3]; self.samples.len()];
+        for index in order {
+            let mut loads = setup.loads(simulation.scene())?;
+            let report = simulation.advance_under(time(index), &mut loads, &mut |_| {}).map_err(Problem::of)?;
+            if let supple::step::Status::Diverged(divergence) = report.status {
+                return Err(Problem(format!("{}: the simulation {divergence}", self.name)));
+            }
+            found[index] = self.points[index].displacement(&displacements(simulation.state()));
+        }
+        Ok(found)
+    }
+}

@@ -1,0 +1,145 @@
+//! What the data of a fit can tell: standard errors and correlations of the values, points predicted without
+//! themselves. Linear about the best values: with the derivatives `J` and the residuals `r` of `m` numbers and `p`
+//! values the variance of a number is `s^2 = r'r / (m - p)`, the covariance of the values `s^2 (J'J)^-1`, and what a
+//! point misses if the fit does not know it `(1 - H)^-1 r` with `H = J (J'J)^-1 J'` in its rows (Cook and Weisberg,
+//! "Residuals and Influence in Regression", 1982).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::file::Unknown;
+use super::solve::Solution;
+
+/// The least singular value that counts, over the largest, of derivatives scaled to columns of length one.
+const SINGULAR: f64 = 1e-6;
+/// A standard error above this share of the value, or of the range that it may have, says that data cannot tell it.
+const MOST_OF_VALUE: f64 = 0.5;
+const MOST_OF_RANGE: f64 = 0.1;
+/// Two values whose correlation is above this cannot be told apart.
+const MOST_CORRELATION: f64 = 0.98;
+
+pub(crate) struct Statistics {
+    /// In the unit of the scene, as if there were no limits.
+    pub(crate) standard_errors: Vec<f64>,
+    /// Of all pairs.
+    pub(crate) correlations: DMatrix<f64>,
+    /// Sentences about what the data cannot tell.
+    pub(crate) untold: Vec<String>,
+    /// Whether the data tell the value.
+    pub(crate) told: Vec<bool>,
+    /// What each point misses without itself, mm, in the order of the groups; none where the fit needs the point.
+    pub(crate) without: Vec<Option<f64>>,
+}
+
+/// `groups`: the rows of the residuals that are one point's.
+pub(crate) fn of(unknowns: &[Unknown], solution: &Solution, groups: &[Vec<usize>]) -> Statistics {
+    let Solution { values, residuals, jacobian, .. } = solution;
+    let count = unknowns.len();
+    let inverse = inverse_of_normal(jacobian);
+    let freedom = residuals.len().saturating_sub(count);
+    let variance = if freedom > 0 { residuals.norm_squared() / freedom as f64 } else { f64::INFINITY };
+    let standard_errors = (0..count).map(|index| (variance * inverse[(index, index)]).sqrt()).collect();
+    let correlations =
+        DMatrix::from_fn(count, count, |a, b| inverse[(a, b)] / (inverse[(a, a)] * inverse[(b, b)]).sqrt());
+    let mut statistics =
+        Statistics { standard_errors, correlations, untold: vec![], told: vec![true; count], without: vec![] };
+    if freedom == 0 {
+        let message = format!(
+            "{} measured numbers for {count} parameters: no errors can be estimated; measure more",
+            residuals.len()
+        );
+        statistics.untold.push(message);
+    }
+    for (index, unknown) in unknowns.iter().enumerate() {
+        statistics.judge(index, unknown, values[index], solution);
+    }
+    statistics.judge_pairs(unknowns);
+    statistics.without = groups.iter().map(|rows| without(jacobian, &inverse, residuals, rows)).collect();
+    statistics
+}
+
+/// `(J'J)^-1`, large and finite in directions that the data do not show.
+fn inverse_of_normal(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let largest = columns.column_iter().map(|column| column.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let length = |norm: f64| norm.max(SINGULAR * largest);
+    let lengths: Vec<f64> = columns.column_iter().map(|column| length(column.norm())).collect();
+    let mut scaled = columns.clone();
+    for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
+        column.unscale_mut(*length);
+    }
+    let eigen = (scaled.transpose() * &scaled).symmetric_eigen();
+    let least = SINGULAR * SINGULAR;
+    let inverses = eigen.eigenvalues.map(|value| 1.0 / value.max(least));
+    let mut inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverses) * eigen.eigenvectors.transpose();
+    for row in 0..lengths.len() {
+        for column in 0..lengths.len() {
+            inverse[(row, column)] /= lengths[row] * lengths[column];
+        }
+    }
+    inverse
+}
+
+/// What the numbers of a point miss if the fit does not know them, mm.
+fn without(columns: &DMatrix<f64>, inverse: &DMatrix<f64>, residuals: &DVector<f64>, rows: &[usize]) -> Option<f64> {
+    let of_point = columns.select_rows(rows);
+    let own = DVector::from_iterator(rows.len(), rows.iter().map(|&row| residuals[row]));
+    let known = DMatrix::identity(rows.len(), rows.len()) - &of_point * inverse * of_point.transpose();
+    // Without the point a value could be anything.
+    let is_needed = known.clone().symmetric_eigen().eigenvalues.min() < 1e-6;
+    if is_needed { None } else { Some((known.try_inverse()? * own).norm()) }
+}
+
+impl Statistics {
+    fn judge(&mut self, index: usize, unknown: &Unknown, value: f64, solution: &Solution) {
+        let name = unknown.name();
+        let error = self.standard_errors[index];
+        if solution.jacobian.column(index).norm() == 0.0 {
+            self.told[index] = false;
+            self.untold.push(format!("{name} moves no measured point; measure elsewhere, or leave it out"));
+            return;
+        }
+        let range = unknown.most - unknown.least;
+        if error > MOST_OF_VALUE * value.abs() || error > MOST_OF_RANGE * range {
+            self.told[index] = false;
+            self.untold.push(format!(
+                "the data cannot tell {name}: its standard error is {}, its value {} of a range from {} to {}; give it a fixed value from \
+                 another source",
+                short(error), short(value), unknown.least, unknown.most
+            ));
+        } else if solution.at_limit[index] {
+            self.untold.push(format!(
+                "{name} stays at its limit, {}: the data want it further; give a wider limit, or look for another cause of what they show",
+                short(value)
+            ));
+        }
+    }
+
+    fn judge_pairs(&mut self, unknowns: &[Unknown]) {
+        for a in 0..unknowns.len() {
+            for b in 0..a {
+                let correlation = self.correlations[(a, b)];
+                if correlation.abs() > MOST_CORRELATION {
+                    (self.told[a], self.told[b]) = (false, false);
+                    self.untold.push(format!(
+                        "the data cannot tell {} from {}: their correlation is {correlation:.4}; fix one of them",
+                        unknowns[b].name(),
+                        unknowns[a].name()
+                    ));
+                }
+            }
+        }
+    }
+}
+
+/// Four digits.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 3 - value.abs().log10().floor() as i32;
+    if (-6..=8).contains(&digits) {
+        let unit = 10f64.powi(digits);
+        format!("{:.*}", digits.max(0) as usize, (value * unit).round() / unit)
+    } else {
+        format!("{value:.3e}")
+    }
+}

@@ -1,0 +1,215 @@
+//! `supple fit`: known values come back from displacements with noise, what the data cannot tell is told, and what is
+//! wrong with the input is refused with its place.
+
+use serde_json::Value;
+
+use super::{Desk, Said};
+
+/// A bar of 20 x 20 x 50 mm that is fixed at z = 0, under gravity across.
+fn scene(cells: [u32; 3], more: &str) -> String {
+    format!(
+        "gravity = [9.81, 0.0, 0.0]\ndamping = 25.0\n[mesh]\nshape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = {cells:?}\n\
+         element = \"nodal-strain\"\n[material]\nlaw = \"neo-hookean\"\nc = 5000.0\nd = 75000.0\ndensity = 1000.0\n\
+         [[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n{more}[time]\nend = 1.0\n"
+    )
+}
+
+/// Young's modulus of the scene, Pa: shear modulus 10,000, bulk modulus 150,000.
+const YOUNG: f64 = 9.0 * 150e3 * 10e3 / (3.0 * 150e3 + 10e3);
+
+/// Even pseudo-random numbers in -1 to 1.
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Displacements of some nodes of a simulated scene at its end, with so much noise (m) at most, as measured.
+fn measured(desk: &Desk, scene: &str, most_noise: f64, time: &str) -> String {
+    let said = desk.simulate(scene, &["--force"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let mut noise = noise();
+    let (header, cell) = if time.is_empty() { ("", String::new()) } else { ("time_s,", format!("{time},")) };
+    let mut text = format!("{header}name,x_m,y_m,z_m,ux_m,uy_m,uz_m\n");
+    for [node, x, y, z, ux, uy, uz] in desk.last().into_iter().filter(|row| row[3] > 0.0).step_by(7) {
+        let [ux, uy, uz] = [ux, uy, uz].map(|metre| metre + most_noise * noise());
+        text += &format!("{cell}n{node},{x},{y},{z},{ux},{uy},{uz}\n");
+    }
+    text
+}
+
+const YOUNG_TABLE: &str = "[[parameter]]\nname = \"material.young\"\nstart = 10000.0\nmin = 2000.0\nmax = 500000.0\n";
+
+fn fit(desk: &Desk, text: &str) -> Said {
+    desk.write("fit.toml", text);
+    desk.supple(&["fit", "fit.toml", "--out", "fit.json"])
+}
+
+fn result(desk: &Desk) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(desk.path("fit.json")).unwrap()).unwrap()
+}
+
+fn case(more: &str) -> String {
+    format!("[[case]]\nscene = \"model.toml\"\nmeasured = \"points.csv\"\n{more}")
+}
+
+#[test]
+fn young_comes_back_from_another_mesh_with_noise() {
+    let desk = Desk::new();
+    let points = measured(&desk, &scene([4, 4, 9], ""), 0.2e-3, "");
+    desk.write("points.csv", &points);
+    desk.write("model.toml", &scene([3, 3, 7], ""));
+    let name = |line: usize| points.lines().nth(line).unwrap().split(',').next().unwrap();
+    let left_out = format!("left_out = [\"{}\", \"{}\"]\n", name(8), name(20));
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case(&left_out)));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let result = result(&desk);
+    let young = &result["parameters"][0];
+    let (value, error) = (young["value"].as_f64().unwrap(), young["standard_error"].as_f64().unwrap());
+    println!("{}{result:#}", said.out);
+    // The coarser mesh is some per cent stiffer or softer.
+    assert!((value / YOUNG - 1.0).abs() < 0.07, "{value} of {YOUNG}");
+    assert!(error > 1e-4 * value && error < 0.02 * value, "{error}");
+    assert!(young["told"].as_bool().unwrap() && result["converged"].as_bool().unwrap());
+    assert!(result["simulations"].as_u64().unwrap() <= 6, "{}", result["simulations"]);
+    // Even noise of at most 0.2 mm an axis is 0.2 mm rms of a point.
+    for distances in ["residuals", "left_out", "each_point_left_out"] {
+        let rms = result[distances]["rms_m"].as_f64().unwrap();
+        assert!(rms > 0.1e-3 && rms < 0.35e-3, "{distances} {rms}");
+    }
+    assert_eq!(result["left_out"]["points"], 2);
+    assert!(said.out.contains("mm rms of 2 points"), "{}", said.out);
+    // The scene's constants for the value found.
+    let set = &result["cases"][0]["set"];
+    let c: f64 = set[0]["value"].as_str().unwrap().parse().unwrap();
+    assert_eq!(set[0]["key"], "c");
+    assert!((c / 5000.0 / (value / YOUNG) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn damping_comes_back_from_displacements_over_time() {
+    let desk = Desk::new();
+    let mut all = String::new();
+    for end in ["0.06", "0.1", "0.15"] {
+        let text = measured(&desk, &scene([2, 2, 5], "").replace("end = 1.0", &format!("end = {end}")), 0.05e-3, end);
+        all += if all.is_empty() { &text } else { text.split_once('\n').unwrap().1 };
+    }
+    desk.write("points.csv", &all);
+    desk.write("model.toml", &scene([2, 2, 5], ""));
+    let said = fit(
+        &desk,
+        &format!("[[parameter]]\nname = \"damping\"\nstart = 0.0\nmin = 0.0\nmax = 100.0\n{YOUNG_TABLE}{}", case("")),
+    );
+    assert_eq!(said.code, 0, "{}", said.err);
+    let result = result(&desk);
+    println!("{}", said.out);
+    for (index, truth) in [25.0, YOUNG].into_iter().enumerate() {
+        let parameter = &result["parameters"][index];
+        let (value, error) = (parameter["value"].as_f64().unwrap(), parameter["standard_error"].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{value} +- {error} of {truth}");
+    }
+}
+
+#[test]
+fn what_the_data_cannot_tell_is_told() {
+    let desk = Desk::new();
+    let force = "[[force]]\nplane = { axis = \"z\", at = 0.05 }\nnewton = [0.002, 0.0, 0.0]\n";
+    let model = scene([2, 2, 5], force).replace("9.81", "0.0");
+    let points = measured(&desk, &model, 0.05e-3, "");
+    desk.write("points.csv", &points);
+    desk.write("model.toml", &model);
+    // Only their ratio moves the bar.
+    let force = "[[parameter]]\nname = \"force[0].newton\"\nstart = 0.8\nmin = 0.1\nmax = 10.0\n";
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{force}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("cannot tell material.young from force[0].newton"), "{}", said.err);
+    assert!(said.out.contains("(the data cannot tell it)"), "{}", said.out);
+    assert_eq!(result(&desk)["parameters"][1]["told"], false);
+    // Density moves nothing where there is no gravity.
+    let density = "[[parameter]]\nname = \"material.density\"\nstart = 900.0\nmin = 500.0\nmax = 2000.0\n";
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{density}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("material.density moves no measured point"), "{}{}", said.out, said.err);
+    let result = result(&desk);
+    assert_eq!([&result["parameters"][0]["told"], &result["parameters"][1]["told"]], [true, false], "{}", said.out);
+    // Poisson's ratio of a bending bar, with the noise of a tracker.
+    let points = measured(&desk, &model, 0.5e-3, "");
+    desk.write("points.csv", &points);
+    let poisson = "[[parameter]]\nname = \"material.poisson\"\nstart = 0.4\nmin = 0.2\nmax = 0.49\n";
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{poisson}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    println!("{}{}", said.out, said.err);
+    assert!(said.err.contains("cannot tell material.poisson"), "{}{}", said.out, said.err);
+}
+
+#[test]
+fn a_value_stays_at_its_limit_and_says_so() {
+    let desk = Desk::new();
+    let points = measured(&desk, &scene([2, 2, 5], ""), 0.0, "");
+    desk.write("points.csv", &points);
+    desk.write("model.toml", &scene([2, 2, 5], ""));
+    let said = fit(&desk, &format!("{}{}", YOUNG_TABLE.replace("500000.0", "20000.0"), case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("material.young stays at its limit, 20000"), "{}", said.err);
+    let young = result(&desk)["parameters"][0].clone();
+    assert_eq!((young["value"].as_f64(), young["at_limit"].as_bool()), (Some(20000.0), Some(true)));
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused_with_its_place() {
+    let desk = Desk::new();
+    desk.write("model.toml", &scene([2, 2, 5], ""));
+    let header = "x_m,y_m,z_m,ux_m,uy_m,uz_m\n";
+    desk.write("points.csv", &format!("{header}0.01,0.01,0.05,0.001,,\n"));
+    let refused = |text: &str, words: &str| {
+        let said = fit(&desk, text);
+        assert_eq!(said.code, 2, "{text}: {}", said.out);
+        assert!(said.err.contains(words), "{text}: {} lacks {words}", said.err);
+        assert!(!desk.path("fit.json").exists());
+    };
+    let both = format!("{YOUNG_TABLE}{}", case(""));
+    refused(
+        &both.replace("start = 10000.0", "start = 1000.0"),
+        "fit.toml, line 3: start is 1000, it must be from min, 2000, to max, 500000",
+    );
+    refused(
+        &both.replace("min = 2000.0", "min = 6e5"),
+        "fit.toml, line 4: min is 600000 and max is 500000; min must be below max",
+    );
+    refused(
+        &both.replace("material.young", "material.stiffness"),
+        "fit.toml, line 2: the scene has no value material.stiffness",
+    );
+    refused(
+        &both.replace("material.young", "material..c"),
+        "fit.toml, line 2: \"material..c\" is not the place of a value",
+    );
+    refused(&both.replace("material.young", "spring[0].stiffness"), "spring[0].stiffness: spring is not there");
+    refused(&both.replace("max =", "most ="), "fit.toml, line 5: unknown field `most`");
+    refused(&both.replace("model.toml", "other.toml"), "fit.toml, line 7: other.toml: cannot be read");
+    refused(&both.replace("points.csv", "other.csv"), "fit.toml, line 8: other.csv: cannot be read");
+    refused(&format!("{YOUNG_TABLE}{both}"), "the parameter material.young is there twice");
+    refused(&case(""), "there is no [[parameter]]");
+    refused(YOUNG_TABLE, "there is no [[case]]");
+    refused(&format!("{both}left_out = true\n"), "all points are left out");
+    refused(&format!("{both}left_out = [\"tip\"]\n"), "no measured point has the name \"tip\"");
+    let two = YOUNG_TABLE
+        .replace("material.young", "material.poisson")
+        .replace("10000.0", "0.4")
+        .replace("2000.0", "0.3")
+        .replace("500000.0", "0.45");
+    refused(&format!("{two}{both}"), "2 parameters, but only 1 measured numbers");
+    for (points, words) in [
+        ("0.01,0.01,0.05,wide,,\n", "points.csv: line 2: ux_m is \"wide\", it must be a number"),
+        ("0.01,0.01,0.05,0.1,0.1\n", "points.csv: line 2: 5 values, the first line has 6 columns"),
+        ("0.01,0.01,0.05,,,\n", "the file holds no measured displacement"),
+        ("10,10,50,1,,\n", "mm from the mesh"),
+    ] {
+        desk.write("points.csv", &format!("{header}{points}"));
+        refused(&both, words);
+    }
+    desk.write("points.csv", "x,y_m,z_m,ux_m,uy_m,uz_m\n");
+    refused(&both, "line 1: the column \"x\" is not known; there are x_m");
+}
