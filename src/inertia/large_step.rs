@@ -212,7 +212,7 @@ impl<'w> LargeModel<'w> {
         if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
             return singular;
         }
-        matrices.frames.choose(lattice, places, points);
+        matrices.frames.choose(lattice, places, points, scene.inertia);
         self.stiffening = [1.0; 2];
         let mut compared = self.step;
         for index in 0..self.stiffening.len() {
