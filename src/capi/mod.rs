@@ -55,6 +55,8 @@ mod reaction;
 
 mod simulation;
 
+mod exchange;
+
 mod remarks;
 
 mod mesh_file;

@@ -375,7 +375,7 @@ pub unsafe extern "C" fn supple_sim_advance(
 
 impl supple_settings {
     /// What can be said without a scene.
-    fn check(&self) -> Answer<()> {
+    pub(super) fn check(&self) -> Answer<()> {
         same_abi::<Self>(self.struct_size, self.abi)?;
         let none = SUPPLE_NONE as usize;
         check_choice(none, self.steps, SUPPLE_STEPS_LEARNED)?;
@@ -579,11 +579,30 @@ unsafe fn build(
     }
 }
 
+impl supple_sim {
+    pub(super) const fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    pub(super) const fn set_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+    }
+}
+
+/// The points of its scene at rest, m.
+///
+/// # Safety
+/// As at [`memory::read`]; it is a simulation.
+pub(super) unsafe fn points_of<'a>(sim: *const supple_sim) -> &'a [[f32; 3]] {
+    // SAFETY: the caller's promise.
+    unsafe { Arrays::behind(sim).read((*sim).nodes as usize) }
+}
+
 /// The objects.
 ///
 /// # Safety
 /// As at [`memory::change`].
-unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
+pub(super) unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
     // SAFETY: the caller's promise; objects lie where they were put.
     unsafe {
         memory::is(sim.cast_const())?;
@@ -617,7 +636,7 @@ unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
 ///
 /// # Safety
 /// As at [`supple_sim_set`].
-unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()> {
+pub(super) unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()> {
     // SAFETY: the caller's promise.
     unsafe {
         let supple_sim_objects { scene, state, .. } = objects_of(sim)?;

@@ -9,6 +9,7 @@ use std::vec::Vec;
 use super::{Simulation, SimulationError};
 use crate::material::{AnyLaw, Law, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
+use crate::pulls::let_go;
 use crate::scene::BuildError;
 use crate::tled;
 
@@ -190,13 +191,7 @@ impl Simulation<'_> {
         for pull in &mut self.pulls {
             let [first, count] = pull.nodes.map(|number| number as usize);
             let Some(nodes) = self.pulled.get_mut(first..first + count) else { continue };
-            let is_left = |node: u32| !view.is_alone(node as usize);
-            let left: f32 = nodes.iter().filter(|pulled| is_left(pulled.node)).map(|pulled| pulled.weight).sum();
-            if left > 0.0 {
-                for pulled in nodes {
-                    pulled.weight = if is_left(pulled.node) { pulled.weight / left } else { 0.0 };
-                }
-            } else {
+            if !let_go(view, nodes) {
                 pull.stiffness = 0.0;
             }
         }
