@@ -233,7 +233,9 @@ fn added(
     count: usize,
 ) -> Answer<supple_status> {
     let (index, first) = (object.pulls as usize, object.nodes as usize);
-    let nodes = parts.nodes.get(first..first + count).unwrap_or_default();
+    let nodes = parts.nodes.get_mut(first..first + count).unwrap_or_default();
+    // Of removed tissue alone it pulls nothing that moves.
+    let_go(scene.view(), nodes);
     let most = usual_most(scene.view(), nodes);
     let pull = checked(&object_pull(given, [object.nodes, count as u32], most), index, first + count)?;
     let (Some(place), Some(stiffness)) = (parts.pulls.get_mut(index), parts.stiffness.get_mut(index)) else {

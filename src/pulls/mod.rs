@@ -70,6 +70,9 @@ pub struct Pull {
 /// nothing to pull.
 pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
     let is_left = |node: u32| !scene.is_alone(node as usize);
+    if nodes.iter().all(|pulled| is_left(pulled.node)) {
+        return true;
+    }
     let left: f32 = nodes.iter().filter(|pulled| is_left(pulled.node)).map(|pulled| pulled.weight).sum();
     if left <= 0.0 {
         return false;

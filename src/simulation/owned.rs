@@ -17,7 +17,7 @@ use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
 use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
-use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, around, patch, usual_most};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, around, let_go, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -167,6 +167,8 @@ impl<'w> Simulation<'w> {
             count?;
         }
         let count = self.pulled.len() - first;
+        // Of removed tissue alone it pulls nothing that moves.
+        let_go(self.scene.view(), self.pulled.get_mut(first..).unwrap_or_default());
         let most = usual_most(self.scene.view(), self.pulled.get(first..).unwrap_or_default());
         self.pulls.push(Pull { most, ..Pull::new([first as u32, count as u32], point, stiffness) });
         Ok(self.pulls.len() - 1)
