@@ -693,8 +693,9 @@ static supple_status use_sim(void) {
     }
     if (one_in(12)) return supple_state_reset(objects.state);
     if (one_in(10)) {
-        /* Other tissues, or the state of another simulation. */
-        const supple_settings settings = some_settings();
+        /* Other tissues, or the state of another simulation. Stiff ones have short steps: the work of a call is bounded. */
+        supple_settings settings = some_settings();
+        settings.most_steps = 1 + below(30);
         const supple_tissue others[2] = {{{wild(59.0f), 8.0f, 60000.0f, 0.0f}, 1000.0f}, {{100.0f, 8.0f, 60000.0f, 0.0f}, number(1000)}};
         return one_in(2) ? supple_sim_set_tissues(sim, one_in(60) ? NULL : others, below(3), &settings, wanted())
                          : supple_sim_carry_on(sim, object(SIM, 1), one_in(60) ? NULL : &settings, wanted());
