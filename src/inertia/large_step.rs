@@ -294,6 +294,12 @@ impl<'w> LargeModel<'w> {
         self.is_for_other_step = true;
     }
 
+    /// Constants of the tissue have changed: the next step computes all inertia anew.
+    #[cfg(feature = "std")]
+    pub(crate) const fn renew_soon(&mut self) {
+        self.is_for_other_step = true;
+    }
+
     /// The clock of the state has been set since the latest step: inertia still belongs to it.
     pub(crate) const fn is_at(&mut self, progress: &Progress) {
         self.moment = progress.moment();

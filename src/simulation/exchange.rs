@@ -6,6 +6,7 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
+use super::owned::Prepared;
 use super::{Simulation, SimulationError};
 use crate::material::{AnyLaw, Law, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
@@ -50,6 +51,7 @@ impl Simulation<'_> {
     pub fn exchange(&mut self, material: VecMaterial, removed: &[u32]) -> Result<(), SimulationError> {
         let all = self.removed_with(removed)?;
         if removed.is_empty() {
+            // Only constants may differ.
             let former = self.scene.material().clone();
             if self.scene.set_constants(material.clone())? {
                 let undo = |simulation: &mut Self| {
@@ -80,7 +82,8 @@ impl Simulation<'_> {
     /// Lets the constants of some elements change evenly to those of `law`, the law that the tissue has, over `seconds`
     /// from now on; zero: at once. Densities stay. These elements become tissues of their own at once, for which the
     /// scene is built anew; then constants change in 20 stages, each at the begin of a call of [`Simulation::advance`],
-    /// so calls should be shorter than a stage. Each stage takes a pass over the elements and prepares the steps anew.
+    /// so calls should be shorter than a stage. A stage takes as long as some ten exact steps; with steps that choose their
+    /// length, and the last one with long steps, as long as preparing the steps.
     pub fn ablate(&mut self, elements: &[u32], law: impl Into<AnyLaw>, seconds: f64) -> Result<(), SimulationError> {
         let (law, count) = (law.into(), self.tets.len());
         if !(seconds >= 0.0 && seconds.is_finite()) {
@@ -135,11 +138,26 @@ impl Simulation<'_> {
             }
         }
         if is_due {
-            self.exchange(material, &[])?;
+            let is_last = ablations.iter().any(|ablation| ablation.stage == STAGES);
+            if is_last || !self.keeps_long_steps(&material)? {
+                self.exchange(material, &[])?;
+            }
             ablations.retain(|ablation| ablation.stage < STAGES);
             self.changes.ablations = ablations;
         }
         Ok(())
+    }
+
+    /// Goes on with other constants in the long steps that there are, which compute their inertia anew in the next one.
+    /// Whether there are any: their lattice, which takes longest to prepare, is that of the nodes and regions alone.
+    fn keeps_long_steps(&mut self, material: &VecMaterial) -> Result<bool, SimulationError> {
+        let Some(Prepared::Long(large, _)) = &mut self.prepared else { return Ok(false) };
+        if !self.scene.set_constants(material.clone())? || !tled::carry_on(&self.scene, &mut self.state) {
+            return Ok(false);
+        }
+        let (model, _) = large.parts();
+        model.renew_soon();
+        Ok(true)
     }
 
     /// Whether an element is removed.

@@ -44,6 +44,30 @@ fn the_end_is_that_of_a_body_that_was_so_from_the_start() {
     }
 }
 
+/// Ten times as stiff or as soft, in motion and in one frame's stages: long steps keep their lattice meanwhile.
+#[test]
+fn long_steps_stand_strong_ablations() {
+    for element in ELEMENTS {
+        for (index, factor) in [10.0, 0.1, 10.0, 0.1].into_iter().enumerate() {
+            let region = elements_where(|[x, y, z]| if index < 2 { z > 0.05 } else { x + y + z < 0.06 });
+            let mut body = bar(element).with(settings(long(), 5.0));
+            body.gravity = [2.0, 0.0, 0.0];
+            body.advance(0.1).unwrap();
+            body.ablate(&region, NeoHookean { c: factor * SOFT.c, d: factor * SOFT.d }, 0.2).unwrap();
+            let mut largest = 0.0f32;
+            for _ in 0..100 {
+                let report = body.advance(0.01).unwrap();
+                assert!(report.status.is_taken());
+                for vector in body.displacements() {
+                    largest = largest.max(glam::Vec3::from(vector.to_array()).length());
+                }
+            }
+            println!("{element:?}, {factor} times as stiff: nodes move by {:.1} mm at most", 1e3 * largest);
+            assert!(largest < 0.35);
+        }
+    }
+}
+
 /// The stages: 20 of them, none larger than a twentieth of the way.
 #[test]
 fn constants_change_in_twenty_stages() {
