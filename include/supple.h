@@ -2422,10 +2422,12 @@ supple_status supple_set_tissues(supple_scene *scene,
 /**
  * The same for a simulation, which goes on with them: for an ablation call it in some twenty stages. Prepare the scene
  * with a tissue of its own for each region that will change. The motion goes on as it is, and the energy balance begins
- * anew. Exact steps take as long as some steps to prepare, long ones as some hundred.
+ * anew.
  *
- * @param settings as at supple_sim_set; where the scene with the new tissues refuses its steps (SUPPLE_E_LATTICE,
- * SUPPLE_E_TOO_STIFF) there are none until the next call.
+ * @param settings NULL: the steps stay as they are, but for what follows from the constants, which takes as long as some
+ * exact steps; not with SUPPLE_STEPS_AUTO (SUPPLE_E_NULL). Else as at supple_sim_set, to prepare them anew, which takes
+ * some hundred exact steps where they are longer, and is best at the end of an ablation. Where the scene with the new
+ * tissues refuses its steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there are none until the next call.
  * @param error may be NULL.
  */
 supple_status supple_sim_set_tissues(supple_sim *sim,

@@ -1180,7 +1180,12 @@ public:
         return detail::of(supple_sim_set(raw_, &how, why));
     }
 
-    // Goes on with other constants of its tissues, of the same densities; settings as at `set`.
+    // Goes on with other constants of its tissues, of the same densities: with the steps that there are, not automatic ones, or with
+    // steps that are prepared anew.
+    status set_tissues(span<const tissue> others, error *why = nullptr) const noexcept {
+        const auto count = static_cast<std::uint32_t>(others.size() < none ? others.size() : none);
+        return detail::of(supple_sim_set_tissues(raw_, others.data(), count, nullptr, why));
+    }
     status set_tissues(span<const tissue> others, const settings &how, error *why = nullptr) const noexcept {
         const auto count = static_cast<std::uint32_t>(others.size() < none ? others.size() : none);
         return detail::of(supple_sim_set_tissues(raw_, others.data(), count, &how, why));

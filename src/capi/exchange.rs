@@ -9,7 +9,7 @@ use super::loads::{can_take_over, supple_set_contact, take_over};
 use super::memory::{self, array, bytes_of, one};
 use super::pulls::let_go_of_removed;
 use super::scene::{OpenScene, set_tissues, supple_scene, supple_tissue};
-use super::simulation::{objects_of, points_of, prepare, supple_settings, supple_sim, supple_sim_objects};
+use super::simulation::{keep_steps, objects_of, points_of, prepare, supple_settings, supple_sim, supple_sim_objects};
 use super::state::{opened, opened_of, supple_state};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use super::vectors::overlap;
@@ -59,10 +59,12 @@ pub unsafe extern "C" fn supple_set_tissues(
 
 /// The same for a simulation, which goes on with them: for an ablation call it in some twenty stages. Prepare the scene
 /// with a tissue of its own for each region that will change. The motion goes on as it is, and the energy balance begins
-/// anew. Exact steps take as long as some steps to prepare, long ones as some hundred.
+/// anew.
 ///
-/// @param settings as at supple_sim_set; where the scene with the new tissues refuses its steps (SUPPLE_E_LATTICE,
-/// SUPPLE_E_TOO_STIFF) there are none until the next call.
+/// @param settings NULL: the steps stay as they are, but for what follows from the constants, which takes as long as some
+/// exact steps; not with SUPPLE_STEPS_AUTO (SUPPLE_E_NULL). Else as at supple_sim_set, to prepare them anew, which takes
+/// some hundred exact steps where they are longer, and is best at the end of an ablation. Where the scene with the new
+/// tissues refuses its steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there are none until the next call.
 /// @param error may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_sim_set_tissues(
@@ -74,11 +76,20 @@ pub unsafe extern "C" fn supple_sim_set_tissues(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
-        let (settings, supple_sim_objects { scene, state, .. }) = (one(settings)?, objects_of(sim)?);
+        let supple_sim_objects { scene, state, .. } = objects_of(sim)?;
+        let change = || {
+            set_tissues(scene.cast_mut(), given(tissues, count)?)?;
+            let open = OpenScene::of(scene)?;
+            tled::carry_on_in(open.view(), opened_of(&open, state)?);
+            Ok(())
+        };
+        if settings.is_null() {
+            keep_steps(sim, change)?;
+            return Ok(SUPPLE_OK);
+        }
+        let settings = one(settings)?;
         settings.check()?;
-        set_tissues(scene.cast_mut(), given(tissues, count)?)?;
-        let open = OpenScene::of(scene)?;
-        tled::carry_on_in(open.view(), opened_of(&open, state)?);
+        change()?;
         prepare(sim, settings)?;
         Ok(SUPPLE_OK)
     };

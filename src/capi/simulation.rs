@@ -589,6 +589,31 @@ impl supple_sim {
     }
 }
 
+/// Lets the steps go on as they are with other constants of the tissues, which `change` sets: exact ones look at the
+/// critical step again, long ones compute their inertia anew. Those that choose their length are refused first.
+///
+/// # Safety
+/// As at [`supple_sim_set`]; `change` leaves the steps alone.
+pub(super) unsafe fn keep_steps(sim: *mut supple_sim, change: impl FnOnce() -> Answer<()>) -> Answer<()> {
+    // SAFETY: the caller's promise; objects lie where they were put.
+    unsafe {
+        match &mut (*sim).prepared {
+            Prepared::None => return Err(SUPPLE_E_NO_STEP.into()),
+            Prepared::Auto(_) => return Err(SUPPLE_E_NULL.into()),
+            Prepared::Exact(exact) | Prepared::Learned { exact, .. } => {
+                change()?;
+                exact.pace.look_soon();
+            }
+            Prepared::Long { steps, .. } => {
+                let (model, _) = large::opened(sim.cast::<u8>().add(*steps).cast())?;
+                change()?;
+                model.renew_soon();
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The points of its scene at rest, m.
 ///
 /// # Safety

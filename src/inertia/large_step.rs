@@ -295,7 +295,7 @@ impl<'w> LargeModel<'w> {
     }
 
     /// Constants of the tissue have changed: the next step computes all inertia anew.
-    #[cfg(feature = "std")]
+    #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
     pub(crate) const fn renew_soon(&mut self) {
         self.is_for_other_step = true;
     }

@@ -127,7 +127,7 @@ static void constants_change(uint32_t steps, const char *name) {
     set_gravity(first);
     for (int stage = 0; stage < 20; stage++) {
         now[1].constants[0] = 59.0f + 10.0f * (float)(stage + 1);
-        CHECK(supple_sim_set_tissues(first, now, 2, &settings, NULL) == SUPPLE_OK);
+        CHECK(supple_sim_set_tissues(first, now, 2, stage < 19 ? NULL : &settings, NULL) == SUPPLE_OK);
         advance(first, 1);
     }
     supple_sim *stiff = set_up(second_memory, &settings);
@@ -186,7 +186,7 @@ static void refusals_change_nothing(void) {
     CHECK(supple_sim_carry_on(second, second, &settings, NULL) == SUPPLE_E_OVERLAP);
     CHECK(supple_sim_carry_on(second, first, &fewer, &error) == SUPPLE_E_CAPACITY && error.value == 1.0 && error.limit == 0.0);
     supple_tissue other = tissue;
-    CHECK(supple_sim_set_tissues(first, &other, 1, NULL, NULL) == SUPPLE_E_NULL);
+    CHECK(supple_sim_set_tissues(NULL, &other, 1, &settings, NULL) == SUPPLE_E_NULL);
     CHECK(supple_sim_set_tissues(first, NULL, 1, &settings, NULL) == SUPPLE_E_NULL);
     CHECK(supple_sim_set_tissues(first, &other, 0, &settings, &error) == SUPPLE_E_MISMATCH);
     other.constants[0] = NAN;
@@ -211,6 +211,11 @@ static void refusals_change_nothing(void) {
     points[5][0] -= 1e-5f;
     CHECK(hash(first_memory, ROOM) == before);
     advance(first, 1);
+    /* Steps that choose their length are prepared anew. */
+    const supple_settings chosen = settings_of(SUPPLE_STEPS_AUTO);
+    supple_sim *adaptive = set_up(third_memory, &chosen);
+    CHECK(supple_sim_set_tissues(adaptive, &tissue, 1, NULL, NULL) == SUPPLE_E_NULL);
+    CHECK(supple_sim_set_tissues(adaptive, &tissue, 1, &chosen, NULL) == SUPPLE_OK);
 }
 
 /* The objects below a supple_sim: a second scene, and a contact whose surface has changed. */

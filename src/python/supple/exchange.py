@@ -102,7 +102,10 @@ def next_stage(simulation: Simulation) -> None:
         share = ablation.stage_at(now) / _STAGES
         tissues["constants"][ablation.tissue] = ablation.begin + share * (ablation.end - ablation.begin)
     rows = library.pointer("supple_tissue", tissues)
-    status = lib.supple_sim_set_tissues(simulation._sim, rows, len(tissues), simulation._settings, error)
+    # Long steps are prepared anew at the end.
+    is_last = any(ablation.stage_at(now) == _STAGES for ablation in due)
+    settings = simulation._settings if is_last or simulation.method == "auto" else ffi.NULL
+    status = lib.supple_sim_set_tissues(simulation._sim, rows, len(tissues), settings, error)
     library.checked(status, error, "ablation")
     for ablation in due:
         ablation.stage = ablation.stage_at(now)
