@@ -195,9 +195,9 @@ impl Random {
     }
 }
 
-/// Balls and single elements, one after the other, in motion: no status that says nothing of a number that is none.
+/// Balls and single elements, one after the other, in motion, some of them ablated first: no status that says nothing of a number that is none.
 #[test]
-fn a_hundred_random_removals_end_well_or_in_words() {
+fn a_hundred_random_changes_end_well_or_in_words() {
     let mut random = Random(49);
     let (mut refused, mut diverged, mut largest) = (0, 0, 0.0f32);
     for run in 0..20 {
@@ -210,7 +210,13 @@ fn a_hundred_random_removals_end_well_or_in_words() {
             let radius = 0.02 * random.next();
             let mut removed = elements_where(|point| glam::Vec3::from(point).distance(centre.into()) < radius);
             removed.push((random.next() * 1535.0) as u32);
-            refused += usize::from(body.remove(&removed).is_err());
+            if random.next() < 0.3 {
+                let factor = 0.2 + 5.0 * random.next();
+                let law = NeoHookean { c: factor * SOFT.c, d: factor * SOFT.d };
+                refused += usize::from(body.ablate(&removed, law, 0.05 * f64::from(random.next())).is_err());
+            } else {
+                refused += usize::from(body.remove(&removed).is_err());
+            }
             for _ in 0..3 {
                 match body.advance(0.01) {
                     Ok(report) => {
@@ -269,4 +275,56 @@ fn a_state_goes_on_in_a_second_scene() {
     assert_eq!(state.displacements()[NODES - 1], frozen);
     assert_eq!(second.element_count(), 72);
     assert!(mesh.without(&removed[1..]).is_err() && mesh.without(&[true; SMALL.element_count()]).is_err());
+}
+
+/// Point masses stay, as far as their nodes do, and a surface of the caller's loses what is gone.
+#[test]
+fn point_masses_and_surfaces_of_the_callers_stay() {
+    let (points, tets): (Vec<_>, Vec<_>) = (BAR.points().collect(), BAR.tets().collect());
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    let supports: Vec<_> = (0..25).map(Support::fixed).collect();
+    let tissue = VecMaterial::one(Element::NodalPressure, SOFT, DENSITY);
+    let mut scene = supple::scene::VecScene::build(tissue, &mesh, &supports).unwrap();
+    let (stays, goes) = (BAR.node(2, 2, 8) as usize, BAR.node(2, 2, 16) as usize);
+    scene.add_mass(stays, 0.01);
+    scene.add_mass(goes, 0.01);
+    let nodes = supple::contact::boundary(&mesh);
+    let triangles = supple::contact::boundary_triangles(&mesh, &nodes);
+    let before = (nodes.len(), triangles.len());
+    let mut body = Simulation::of_scene(scene, points, tets).with(settings(Method::Exact, 10.0));
+    body.meet(nodes, triangles).unwrap();
+    let ball = Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.0081, 0.015, 0.06]));
+    body.instruments = vec![ball];
+    body.gravity = [-2.0, 0.0, 0.0];
+    body.advance(0.02).unwrap();
+    let mass = body.scene().view().node_mass(stays);
+    body.remove(&elements_where(|[_, _, z]| z > 0.09)).unwrap();
+    assert!((body.scene().view().node_mass(stays) / mass - 1.0).abs() < 1e-6 && mass > 0.01);
+    assert!(body.scene().view().node_mass(goes) < 1e-15);
+    for _ in 0..10 {
+        assert!(body.advance(0.02).unwrap().is_ok());
+    }
+    println!("{before:?}, {} contacts, {:?} N", body.touches()[0].contacts, body.touches()[0].force);
+    assert!(body.touches()[0].contacts > 0);
+}
+
+/// A network goes on after another lead-in.
+#[test]
+fn learned_steps_are_led_again() {
+    use supple::material::Exponential;
+    use supple::mlp::{Network, WeightBytes};
+    let bytes = WeightBytes::of(include_bytes!("../../weights/compact-10.weights"));
+    let network = Network::parse(bytes.bytes()).unwrap();
+    let tissue = VecMaterial::one(Element::Linear, Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, DENSITY);
+    let supports: Vec<_> = (0..25).map(Support::fixed).collect();
+    let method = Method::Learned { network, lead_in: 0.05, fallback: true };
+    let settings = Settings { method, guard: false, ..Settings::default() };
+    let mut body = Simulation::new(BAR.points(), BAR.tets(), tissue, &supports).unwrap().with(settings);
+    body.gravity = [0.5, 0.0, 0.0];
+    assert!(body.advance(0.2).unwrap().learned > 0);
+    body.remove(&elements_where(|[_, _, z]| z > 0.09)).unwrap();
+    let report = body.advance(0.2).unwrap();
+    println!("{report:?}");
+    assert!(report.exact > 0 && report.status.is_taken());
+    assert!(body.displacements().iter().all(|vector| vector.to_array().iter().all(|x| x.is_finite())));
 }
