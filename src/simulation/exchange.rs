@@ -6,7 +6,7 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
-use super::owned::Prepared;
+use super::owned::{Exact, Prepared};
 use super::{Simulation, SimulationError};
 use crate::material::{AnyLaw, Law, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
@@ -82,7 +82,7 @@ impl Simulation<'_> {
     /// Lets the constants of some elements change evenly to those of `law`, the law that the tissue has, over `seconds`
     /// from now on; zero: at once. Densities stay. These elements become tissues of their own at once, for which the
     /// scene is built anew; then constants change in 20 stages, each at the begin of a call of [`Simulation::advance`],
-    /// so calls should be shorter than a stage. A stage takes as long as some ten exact steps; with steps that choose their
+    /// so calls should be shorter than a stage. A stage takes as long as some thirty exact steps; with steps that choose their
     /// length, and the last one with long steps, as long as preparing the steps.
     pub fn ablate(&mut self, elements: &[u32], law: impl Into<AnyLaw>, seconds: f64) -> Result<(), SimulationError> {
         let (law, count) = (law.into(), self.tets.len());
@@ -139,7 +139,7 @@ impl Simulation<'_> {
         }
         if is_due {
             let is_last = ablations.iter().any(|ablation| ablation.stage == STAGES);
-            if is_last || !self.keeps_long_steps(&material)? {
+            if !self.keeps_steps(&material, is_last)? {
                 self.exchange(material, &[])?;
             }
             ablations.retain(|ablation| ablation.stage < STAGES);
@@ -148,15 +148,23 @@ impl Simulation<'_> {
         Ok(())
     }
 
-    /// Goes on with other constants in the long steps that there are, which compute their inertia anew in the next one.
-    /// Whether there are any: their lattice, which takes longest to prepare, is that of the nodes and regions alone.
-    fn keeps_long_steps(&mut self, material: &VecMaterial) -> Result<bool, SimulationError> {
-        let Some(Prepared::Long(large, _)) = &mut self.prepared else { return Ok(false) };
+    /// Goes on with other constants in the steps that there are: exact ones look at the critical step again, long ones
+    /// compute their inertia anew in the next one, as their lattice is that of the nodes and regions alone. Whether it
+    /// was done; long steps are prepared anew at the last stage, for the length that fits.
+    fn keeps_steps(&mut self, material: &VecMaterial, is_last: bool) -> Result<bool, SimulationError> {
+        match &mut self.prepared {
+            Some(Prepared::Exact(_)) => {}
+            Some(Prepared::Long(..)) if !is_last => {}
+            _ => return Ok(false),
+        }
         if !self.scene.set_constants(material.clone())? || !tled::carry_on(&self.scene, &mut self.state) {
             return Ok(false);
         }
-        let (model, _) = large.parts();
-        model.renew_soon();
+        match &mut self.prepared {
+            Some(Prepared::Exact(Exact::Paced { pace, .. })) => pace.look_soon(),
+            Some(Prepared::Long(large, _)) => large.parts().0.renew_soon(),
+            _ => {}
+        }
         Ok(true)
     }
 
