@@ -11,12 +11,12 @@ import ctypes
 import subprocess
 import sys
 import tempfile
-from ctypes import POINTER, Structure, byref, c_double, c_float, c_int32, c_size_t, c_uint16, c_uint32, c_void_p
+from ctypes import POINTER, Structure, byref, c_double, c_float, c_int32, c_size_t, c_uint8, c_uint16, c_uint32, c_void_p
 from pathlib import Path
 
 import numpy as np
 
-ABI, ALIGN, EXPONENTIAL, CHECKED = 6, 64, 1, 0  # SUPPLE_... in include/supple.h
+ABI, ALIGN, EXPONENTIAL, CHECKED = 7, 64, 1, 0  # SUPPLE_... in include/supple.h
 ELEMENTS = {"linear": 0, "nodal-pressure": 1, "nodal-strain": 2}
 SIZE, CELLS = np.array([0.05, 0.05, 0.1]), (8, 8, 17)  # m
 LAW, DENSITY, DAMPING = (59.0, 8.023, 60000.0), 1000.0, 20.0  # a Pa, b, d Pa; kg/m^3; 1/s
@@ -39,7 +39,7 @@ class SceneConfig(Structure):
         *((name, c_uint32) for name in ("nodes", "elements", "supports", "tissues")),
         ("points", POINTER(c_float)), ("tetrahedra", POINTER(c_uint32)), ("support", POINTER(Support)),
         ("tissue", POINTER(Tissue)), ("tissue_of_element", POINTER(c_uint16)),
-        ("element", c_uint32), ("reserved", c_uint32),
+        ("element", c_uint32), ("reserved", c_uint32), ("removed", POINTER(c_uint8)),
     ]
 
 
@@ -142,7 +142,7 @@ def moved_by_library(path, element, points, tetrahedra, forces, pulled):
     config = SceneConfig(
         ctypes.sizeof(SceneConfig), ABI, EXPONENTIAL, CHECKED, nodes, elements, len(held), 1,
         local.ctypes.data_as(POINTER(c_float)), tetrahedra.ctypes.data_as(POINTER(c_uint32)), held,
-        ctypes.pointer(tissue), None, element, 0,
+        ctypes.pointer(tissue), None, element, 0, None,
     )
     size = library.size("supple_scene_size", nodes, elements, 1)
     if element == ELEMENTS["nodal-strain"]:

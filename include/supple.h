@@ -77,7 +77,7 @@
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 6
+#define SUPPLE_ABI 7
 
 /**
  * No node, element or axis.
@@ -647,8 +647,8 @@ typedef struct supple_pulls supple_pulls;
 typedef struct supple_reaction supple_reaction;
 
 /**
- * What is simulated: element tables, masses, supports. After supple_scene_init nothing changes it: any
- * number of threads may use one scene at the same time.
+ * What is simulated: element tables, masses, supports. After supple_scene_init nothing but supple_set_tissues changes
+ * it: any number of threads may use one scene at the same time.
  */
 typedef struct supple_scene supple_scene;
 
@@ -760,6 +760,11 @@ typedef struct {
      * 0.
      */
     uint32_t reserved;
+    /**
+     * For each element 1 if it is removed, as after a resection, else 0; NULL: none is. Nodes and elements keep their
+     * numbers; nodes without an element left are held where they are and weigh nothing.
+     */
+    const uint8_t *removed;
 } supple_scene_config;
 
 /**
@@ -801,7 +806,7 @@ typedef struct {
      */
     uint32_t nodes;
     /**
-     * Elements that take part; those with four fixed nodes were left out.
+     * Elements that take part; those with four fixed nodes, and removed ones, were left out.
      */
     uint32_t elements;
     /**
@@ -2282,6 +2287,17 @@ supple_status supple_grasp(supple_contact *contact,
                            uint32_t *held);
 
 /**
+ * Lets a contact go on where another one is, of a scene of the same nodes: with its instruments where they are, and the
+ * nodes that these hold, as far as they are in the new surface and the scene has elements around them. Nothing touches
+ * yet. For a surface that has changed, as after a resection.
+ *
+ * @param scene of the new contact.
+ */
+supple_status supple_contact_carry_on(supple_contact *contact,
+                                      const supple_scene *scene,
+                                      supple_contact *from);
+
+/**
  * Lets go what an instrument holds.
  */
 supple_status supple_let_go(supple_contact *contact, uint32_t instrument);
@@ -2711,6 +2727,63 @@ supple_status supple_set_displacements(const supple_scene *scene,
                                        const float *displacements,
                                        uint32_t nodes,
                                        supple_error *error);
+
+/**
+ * Lets a state go on in a scene that has taken the place of another one of the same nodes and kind of element: without
+ * some elements, with other tissues. Displacements, velocities and time stay, so what stays of the tissue keeps its
+ * momentum; the energy balance begins anew. All that was prepared for the former scene, apart from loads and contact,
+ * must be prepared again, and the step be set. It takes as long as an exact step or two.
+ */
+supple_status supple_state_carry_on(const supple_scene *scene,
+                                    supple_state *state);
+
+/**
+ * Gives the tissues of a scene other constants, without building it anew: it takes a pass over its elements, and all or
+ * nothing is changed. Nobody may use the scene meanwhile. Call supple_state_carry_on for each of its states.
+ *
+ * @param tissues as many as the scene has, of the same densities, which are checked (SUPPLE_E_MISMATCH).
+ * @param error may be NULL; index is that of an element.
+ */
+supple_status supple_set_tissues(supple_scene *scene,
+                                 const supple_tissue *tissues,
+                                 uint32_t count,
+                                 supple_error *error);
+
+/**
+ * The same for a simulation, which goes on with them: for an ablation call it in some twenty stages. Prepare the scene
+ * with a tissue of its own for each region that will change. The motion goes on as it is, and the energy balance begins
+ * anew.
+ *
+ * @param settings NULL: the steps stay as they are, but for what follows from the constants, which takes as long as some
+ * exact steps; not with SUPPLE_STEPS_AUTO (SUPPLE_E_NULL). Else as at supple_sim_set, to prepare them anew, which takes
+ * some hundred exact steps where they are longer, and is best at the end of an ablation. Where the scene with the new
+ * tissues refuses its steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there are none until the next call.
+ * @param error may be NULL.
+ */
+supple_status supple_sim_set_tissues(supple_sim *sim,
+                                     const supple_tissue *tissues,
+                                     uint32_t count,
+                                     const supple_settings *settings,
+                                     supple_error *error);
+
+/**
+ * Lets a simulation that has just been set up go on where another one is, of a body of the same points: without some
+ * elements (supple_scene_config.removed), with other tissues, another kind of element or other supports. It takes over
+ * displacements, velocities, time, gravity, forces, motions, pressures, pulls, and where it has a surface the instruments with what
+ * they hold; what stays of the tissue keeps its momentum, and the energy balance begins anew. Nodes that belong to no
+ * element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
+ * is left as it is, may go on, and its memory be used for the next exchange. supple_sim_setup, which takes longest, may
+ * run on another thread while the other simulation goes on. This takes as long as supple_sim_set.
+ *
+ * @param from points and kind of contact are checked (SUPPLE_E_MISMATCH); room for its forces, motions and held nodes
+ * must be there (SUPPLE_E_CAPACITY).
+ * @param settings those that `sim` was set up with.
+ * @param error may be NULL.
+ */
+supple_status supple_sim_carry_on(supple_sim *sim,
+                                  supple_sim *from,
+                                  const supple_settings *settings,
+                                  supple_error *error);
 
 /**
  * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called

@@ -379,6 +379,7 @@ struct body {
     span<const support> supports;
     span<const tissue> tissues;
     span<const std::uint16_t> tissue_of_element; // with one tissue: empty
+    span<const std::uint8_t> removed;            // for each element 1 if it is removed; empty: none is
 };
 
 namespace detail {
@@ -398,7 +399,9 @@ template <class T> bool config_of(const body &from, supple_scene_config &config,
     if (from.tetrahedra.size() % 4 != 0) return refuse(status::e_short, from.tetrahedra.size(), elements * 4 + 4);
     if (from.tissues.size() > 1 && from.tissue_of_element.size() < elements)
         return refuse(status::e_short, from.tissue_of_element.size(), elements);
+    if (from.removed.size() > 0 && from.removed.size() < elements) return refuse(status::e_short, from.removed.size(), elements);
     config = detail::config<supple_scene_config>();
+    config.removed = from.removed.size() > 0 ? from.removed.data() : nullptr;
     config.law = static_cast<std::uint32_t>(from.law);
     config.winding = static_cast<std::uint32_t>(from.winding);
     config.element = static_cast<std::uint32_t>(from.element);
@@ -438,6 +441,12 @@ public:
         made.status =
             detail::of(supple_scene_init(place.data(), place.size(), &config, &made.value.raw_, &made.error));
         return made;
+    }
+
+    // Other constants, of the same densities: nobody may use it meanwhile; then state::carry_on.
+    status set_tissues(span<const tissue> others, error *why = nullptr) const noexcept {
+        const auto count = static_cast<std::uint32_t>(others.size() < none ? others.size() : none);
+        return detail::of(supple_set_tissues(raw_, others.data(), count, why));
     }
 
     // Sizes and costs.
@@ -582,6 +591,9 @@ public:
         return detail::of(
             supple_settle(of.raw(), acting.raw(), raw_, metre, most_steps, on, room.data(), room.size(), out));
     }
+
+    // Goes on in a scene that has taken the place of another one of the same nodes; steps are set anew.
+    status carry_on(const scene &in) const noexcept { return detail::of(supple_state_carry_on(in.raw(), raw_)); }
 
     // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
@@ -1099,6 +1111,10 @@ public:
     status grasp(state moved, std::uint32_t which, float within, std::uint32_t *held = nullptr) const noexcept {
         return detail::of(supple_grasp(raw_, moved.raw(), which, within, held));
     }
+    // Takes over the instruments of another contact, with what they hold as far as it is still there.
+    status carry_on(const scene &in, const contact &from) const noexcept {
+        return detail::of(supple_contact_carry_on(raw_, in.raw(), from.raw_));
+    }
     status let_go(std::uint32_t which) const noexcept { return detail::of(supple_let_go(raw_, which)); }
 
     // What one felt in the latest steps.
@@ -1303,6 +1319,22 @@ public:
     // Other steps; also where lengths are chosen, after the state was reset or restored.
     status set(const settings &how, error *why = nullptr) const noexcept {
         return detail::of(supple_sim_set(raw_, &how, why));
+    }
+
+    // Goes on with other constants of its tissues, of the same densities: with the steps that there are, not automatic ones, or with
+    // steps that are prepared anew.
+    status set_tissues(span<const tissue> others, error *why = nullptr) const noexcept {
+        const auto count = static_cast<std::uint32_t>(others.size() < none ? others.size() : none);
+        return detail::of(supple_sim_set_tissues(raw_, others.data(), count, nullptr, why));
+    }
+    status set_tissues(span<const tissue> others, const settings &how, error *why = nullptr) const noexcept {
+        const auto count = static_cast<std::uint32_t>(others.size() < none ? others.size() : none);
+        return detail::of(supple_sim_set_tissues(raw_, others.data(), count, &how, why));
+    }
+
+    // Goes on where another one is, of a body of the same points, as after a resection (body::removed); `how` it was made.
+    status carry_on(const simulation &from, const settings &how, error *why = nullptr) const noexcept {
+        return detail::of(supple_sim_carry_on(raw_, from.raw_, &how, why));
     }
 
     // Moves on by so many seconds, usually a frame.

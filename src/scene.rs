@@ -6,6 +6,7 @@
 //! through [`SceneFacts::build`].
 
 mod build_error;
+mod constants;
 mod owned;
 
 use core::ops::{Deref, Range};
@@ -157,12 +158,15 @@ impl SceneFacts {
         }
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
+        if mesh.has_removed() {
+            mark_alone(nodes, mesh);
+        }
         if material.element() != Element::Linear {
             mark_neighbours(nodes, mesh);
         }
         let still =
             |tet: [u32; 4]| tet.iter().all(|&node| nodes.get(node as usize).is_some_and(NodeInertia::is_left_out));
-        let elements = mesh.tets().enumerate().filter(|&(_, nodes)| !still(nodes));
+        let elements = mesh.elements().filter(|&(_, nodes)| !still(nodes));
         let elements = elements.map(|(element, nodes)| Numbered { element, nodes });
         let mut layout = PartitionLayout::of(nodes.len(), elements.clone());
         let partitions = *layout.partitions();
@@ -210,7 +214,7 @@ impl SceneFacts {
         self.has_point_masses
     }
 
-    /// Number of elements that take part; those with four fixed nodes were left out.
+    /// Number of elements that take part; those with four fixed nodes, and removed ones, were left out.
     #[must_use]
     pub const fn element_count(&self) -> usize {
         self.element_count
@@ -256,6 +260,19 @@ fn mark_supports(nodes: &mut [NodeInertia], supports: impl Iterator<Item = Suppo
     Ok(())
 }
 
+/// Holds the nodes of which all elements are removed. One that motions may move still follows them.
+fn mark_alone(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
+    for node in mesh.tets().flatten() {
+        nodes.get_mut(node as usize).into_iter().for_each(NodeInertia::mark_neighbour);
+    }
+    for node in mesh.all_tets().flatten() {
+        if let Some(inertia) = nodes.get_mut(node as usize).filter(|inertia| inertia.mass == 0.0) {
+            inertia.mark(Axes::XYZ, false);
+        }
+    }
+    nodes.iter_mut().for_each(NodeInertia::clear_mass);
+}
+
 /// Marks the nodes of all elements that can move. With nodal pressure or strain an element between fixed nodes is left
 /// out only if it has none of these: it counts in the volume around them.
 fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
@@ -275,7 +292,7 @@ fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
 /// Finds for each corner of each element which of the tissues at that node it is of ([`ElementTile::slot`]).
 fn find_slots(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInertia], tiles: &mut [ElementTile]) {
     nodes.iter_mut().for_each(NodeInertia::clear_regions);
-    for (element, tet) in mesh.tets().enumerate() {
+    for (element, tet) in mesh.elements() {
         for node in tet {
             if let Some(inertia) = nodes.get_mut(node as usize) {
                 inertia.add_region(material.region(element));
@@ -300,7 +317,7 @@ const ROUNDED_STRAIN: f64 = 1e-4;
 fn lump_masses(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInertia]) -> Result<(f64, f64), BuildError> {
     let (mut mass, mut rounding) = (0.0, 0.0);
     nodes.iter_mut().for_each(NodeInertia::clear_mass);
-    for (element, tet) in mesh.tets().enumerate() {
+    for (element, tet) in mesh.all_tets().enumerate() {
         let Some(tissue) = material.tissue(element) else {
             return Err(BuildError::NoTissue { element });
         };
@@ -310,6 +327,9 @@ fn lump_masses(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInert
         if !(tissue.density.is_finite() && tissue.density > 0.0) {
             return Err(BuildError::Density { element, value: tissue.density });
         }
+        if mesh.is_removed(element) {
+            continue;
+        }
         let volume = volume(mesh.corners(tet));
         let share = 0.25 * volume * f64::from(tissue.density);
         mass += 4.0 * share;
@@ -318,6 +338,11 @@ fn lump_masses(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInert
             if let Some(inertia) = nodes.get_mut(node as usize) {
                 inertia.mass += share as f32;
             }
+        }
+    }
+    if mesh.has_removed() {
+        for node in mesh.all_tets().flatten() {
+            nodes.get_mut(node as usize).into_iter().for_each(NodeInertia::leave_alone);
         }
     }
     for (node, inertia) in nodes.iter_mut().enumerate() {
@@ -381,10 +406,25 @@ impl<'a, M> SceneView<'a, M> {
         places.filter(|(tile, lane)| tile.volume::<f32>(*lane) > 0.0)
     }
 
-    /// Mass of a node, kg; zero for a node that does not exist.
+    /// Mass of a node, kg; almost zero for one whose elements are all removed, zero for one that does not exist.
     #[must_use]
     pub fn node_mass(&self, node: usize) -> f32 {
         self.inertia.get(node).map_or(0.0, |inertia| inertia.mass)
+    }
+
+    /// The supports that the scene was built with, and those of nodes whose elements are all removed.
+    pub fn supports(&self) -> impl Iterator<Item = Support> + use<'a, M> {
+        self.inertia.iter().enumerate().flat_map(|(node, inertia)| {
+            let (held, moves) = (inertia.held(), inertia.movable());
+            let of = move |axes: Axes, moves: bool| Support { node: node as u32, axes, moves };
+            [of(held, false), of(moves, true)].into_iter().filter(|support| support.axes != Axes::NONE)
+        })
+    }
+
+    /// Whether a node belongs to no element any more ([`Mesh::without`]).
+    #[must_use]
+    pub fn is_alone(&self, node: usize) -> bool {
+        self.inertia.get(node).is_some_and(NodeInertia::is_alone)
     }
 
     /// Held axes of a node.

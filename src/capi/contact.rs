@@ -408,6 +408,52 @@ fn insert(grips: &mut [Grip], count: &mut u32, grip: Grip) {
     }
 }
 
+/// Lets a contact go on where another one is, of a scene of the same nodes: with its instruments where they are, and the
+/// nodes that these hold, as far as they are in the new surface and the scene has elements around them. Nothing touches
+/// yet. For a surface that has changed, as after a resection.
+///
+/// @param scene of the new contact.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_contact_carry_on(
+    contact: *mut supple_contact,
+    scene: *const supple_scene,
+    from: *mut supple_contact,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let go_on = || unsafe {
+        let open = OpenScene::of(scene)?;
+        memory::is(from.cast_const())?;
+        if contact == from {
+            return Err(supple_error::from(SUPPLE_E_OVERLAP));
+        }
+        let ((object, arrays), (old, before)) = (memory::open(contact)?, memory::open(from)?);
+        open.fits(object.nodes)?;
+        open.fits(old.nodes)?;
+        let (parts, former) = (object.room().parts(arrays), old.room().parts(before));
+        let held = former.grips.get(..old.grips as usize).unwrap_or_default();
+        let still = || {
+            held.iter().filter_map(|grip| {
+                let node = former.nodes.get(grip.place as usize)?.node;
+                let place = parts.nodes.iter().position(|entry| entry.node == node)? as u32;
+                (!open.view().is_alone(node as usize)).then_some(Grip { place, ..*grip })
+            })
+        };
+        let count = still().count();
+        if count > parts.grips.len() {
+            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(count as f64, parts.grips.len() as f64));
+        }
+        (object.list, object.instruments, object.grips) = (old.list, old.instruments, 0);
+        for grip in still() {
+            insert(parts.grips, &mut object.grips, grip);
+        }
+        object.touches = [Touch::default(); MOST_INSTRUMENTS];
+        object.means = [[0.0; 3]; MOST_INSTRUMENTS];
+        parts.pushes.fill(NodeVector::ZERO);
+        Ok(SUPPLE_OK)
+    };
+    status_of(go_on())
+}
+
 /// Lets go what an instrument holds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument: u32) -> supple_status {

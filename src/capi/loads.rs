@@ -4,6 +4,7 @@ use core::ffi::c_void;
 use core::ptr;
 
 use crate::contact::Touch;
+use crate::copy::copy;
 use crate::loads::{Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::state::StateView;
 
@@ -80,6 +81,10 @@ impl supple_loads {
 
     pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
         self.contact = contact;
+    }
+
+    pub(super) const fn pulls(&self) -> *mut supple_pulls {
+        self.pulls
     }
 
     pub(super) const fn set_pulls(&mut self, pulls: *mut supple_pulls) {
@@ -245,6 +250,50 @@ pub unsafe extern "C" fn supple_set_contact(loads: *mut supple_loads, contact: *
         Ok(SUPPLE_OK)
     };
     status_of(set())
+}
+
+/// That the loads of another scene of the same nodes can be those of `scene`, which has `loads`.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn can_take_over(
+    loads: *mut supple_loads,
+    from: *mut supple_loads,
+    scene: &OpenScene<'_>,
+) -> Answer<()> {
+    // SAFETY: the caller's promise; entries up to the counts were written.
+    unsafe {
+        let object = memory::change(loads)?;
+        let (old, mut arrays) = memory::open(from)?;
+        scene.fits(old.nodes)?;
+        scene.fits(object.nodes)?;
+        room_for(old.forces, object.force_room)?;
+        room_for(old.motions, object.motion_room)?;
+        arrays.change_first::<NodalForce>(0, old.force_room as usize);
+        let motions = arrays.change_first::<Motion>(old.motions as usize, old.motion_room as usize);
+        for (index, motion) in motions.iter().enumerate() {
+            motion.check(index, scene.node_count(), scene.view().movable(motion.node as usize))?;
+        }
+        Ok(())
+    }
+}
+
+/// Takes over gravity, forces, motions, pressures and pulls, where [`can_take_over`].
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn take_over(loads: *mut supple_loads, from: *mut supple_loads) -> Answer<()> {
+    // SAFETY: the caller's promise; entries up to the counts were written.
+    unsafe {
+        let ((object, mut arrays), (old, mut before)) = (memory::open(loads)?, memory::open(from)?);
+        let forces = before.change_first::<NodalForce>(old.forces as usize, old.force_room as usize);
+        let motions = before.change_first::<Motion>(old.motions as usize, old.motion_room as usize);
+        copy(arrays.change_first(old.forces as usize, object.force_room as usize), forces);
+        copy(arrays.change_first(old.motions as usize, object.motion_room as usize), motions);
+        (object.forces, object.motions, object.gravity) = (old.forces, old.motions, old.gravity);
+        (object.pulls, object.pressure) = (old.pulls, old.pressure);
+        Ok(())
+    }
 }
 
 fn room_for(count: u32, room: u32) -> Answer<()> {

@@ -8,7 +8,7 @@
 
 /// Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
 /// the field `abi` of every configuration; a library of another version refuses it.
-pub const SUPPLE_ABI: u32 = 6;
+pub const SUPPLE_ABI: u32 = 7;
 
 /// No node, element or axis.
 pub const SUPPLE_NONE: u32 = u32::MAX;
@@ -62,6 +62,8 @@ mod reaction;
 mod simulation;
 
 mod settle;
+
+mod exchange;
 
 mod remarks;
 

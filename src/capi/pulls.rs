@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::mem::take;
 
-use crate::pulls::{Pull, PullError, PulledNode, Pulls, patch, usual_most};
+use crate::pulls::{Pull, PullError, PulledNode, Pulls, let_go, patch, usual_most};
 use crate::state::{NodeVector, StateView};
 
 use super::loads::supple_loads;
@@ -136,6 +136,29 @@ pub unsafe extern "C" fn supple_pulls_init(
     status_of(init())
 }
 
+/// Lets pulls let go of nodes that belong to no element of the scene any more.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn let_go_of_removed(pulls: *mut supple_pulls, scene: &OpenScene<'_>) -> Answer<()> {
+    if pulls.is_null() {
+        return Ok(());
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (object, arrays) = memory::open(pulls)?;
+        let PullArrays { nodes, pulls, stiffness, .. } = object.parts(arrays);
+        for (pull, stiffness) in pulls.iter_mut().zip(stiffness).take(object.pulls as usize) {
+            let [first, count] = pull.nodes.map(|number| number as usize);
+            let nodes = nodes.get_mut(first..).and_then(|nodes| nodes.get_mut(..count)).unwrap_or_default();
+            if !let_go(scene.view(), nodes) {
+                (pull.stiffness, *stiffness) = (0.0, 0.0);
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Adds a pull on the nodes that are no farther from its point than its radius at rest: their mean displacement moves it. A patch of
 /// some 24 nodes is a good one. It has no target yet: it is absent until supple_set_targets.
 ///
@@ -210,7 +233,9 @@ fn added(
     count: usize,
 ) -> Answer<supple_status> {
     let (index, first) = (object.pulls as usize, object.nodes as usize);
-    let nodes = parts.nodes.get(first..first + count).unwrap_or_default();
+    let nodes = parts.nodes.get_mut(first..first + count).unwrap_or_default();
+    // Of removed tissue alone it pulls nothing that moves.
+    let_go(scene.view(), nodes);
     let most = usual_most(scene.view(), nodes);
     let pull = checked(&object_pull(given, [object.nodes, count as u32], most), index, first + count)?;
     let (Some(place), Some(stiffness)) = (parts.pulls.get_mut(index), parts.stiffness.get_mut(index)) else {

@@ -2,6 +2,7 @@
 
 use core::ffi::c_void;
 
+use crate::copy::copy;
 use crate::element::{ElementTile, NodeInertia, PatchRow};
 use crate::material::{Element, TissueValues};
 use crate::mesh::{Mesh, Winding};
@@ -88,10 +89,13 @@ pub struct supple_scene_config {
     pub element: u32,
     /// 0.
     pub reserved: u32,
+    /// For each element 1 if it is removed, as after a resection, else 0; NULL: none is. Nodes and elements keep their
+    /// numbers; nodes without an element left are held where they are and weigh nothing.
+    pub removed: *const u8,
 }
 
-/// What is simulated: element tables, masses, supports. After supple_scene_init nothing changes it: any
-/// number of threads may use one scene at the same time.
+/// What is simulated: element tables, masses, supports. After supple_scene_init nothing but supple_set_tissues changes
+/// it: any number of threads may use one scene at the same time.
 #[repr(C, align(64))]
 pub struct supple_scene {
     head: Head,
@@ -120,7 +124,7 @@ const _: () = assert!(SUPPLE_SCENE_FRONT == <supple_scene as Object>::FRONT);
 pub struct supple_scene_facts {
     /// Nodes.
     pub nodes: u32,
-    /// Elements that take part; those with four fixed nodes were left out.
+    /// Elements that take part; those with four fixed nodes, and removed ones, were left out.
     pub elements: u32,
     /// Memory that the scene takes, bytes: what a copy of it needs. With nodal strain less than it was built in.
     pub bytes: u64,
@@ -362,7 +366,10 @@ impl<'a> CheckedBody<'a> {
             check_choice(index, support.axes, 7)?;
             check_choice(index, support.moves, 1)?;
         }
-        Ok((law, element, Self { mesh: Mesh::new(points, tets, winding)?, supports, tissues, of_element }))
+        // SAFETY: the caller's promise.
+        let removed = unsafe { removed_of(config)? };
+        let mesh = Mesh::new(points, tets, winding)?.without(removed)?;
+        Ok((law, element, Self { mesh, supports, tissues, of_element }))
     }
 
     /// # Safety
@@ -398,6 +405,51 @@ impl<'a> CheckedBody<'a> {
         });
         let material = SceneMaterial { element, law, tissues, of_element: regions };
         Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches)?)
+    }
+}
+
+/// The marks of removed elements, none where the host gives none.
+///
+/// # Safety
+/// As at [`CheckedBody::checked`].
+unsafe fn removed_of(config: &supple_scene_config) -> Answer<&[bool]> {
+    if config.removed.is_null() {
+        return Ok(&[]);
+    }
+    // SAFETY: the caller's promise.
+    let marks = unsafe { array(config.removed, config.elements as usize)? };
+    for (index, &mark) in marks.iter().enumerate() {
+        check_choice(index, mark.into(), 1)?;
+    }
+    Ok(bytemuck::checked::try_cast_slice(marks).unwrap_or_default())
+}
+
+/// Gives the tissues of a scene other constants. Nothing is changed where they cannot be, or are of other densities, for
+/// which a scene must be built anew.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn set_tissues(scene: *mut supple_scene, tissues: &[TissueValues]) -> Answer<()> {
+    // SAFETY: the caller's promise; the tissues stand where they were built.
+    unsafe {
+        let open = OpenScene::of(scene.cast_const())?;
+        let OpenScene { material, tiles, facts, .. } = &open;
+        if tissues.len() != material.tissues.len() {
+            return Err(mismatch(tissues.len(), material.tissues.len()));
+        }
+        let mut facts = **facts;
+        let &SceneMaterial { element, law, of_element, .. } = material;
+        let new = SceneMaterial { element, law, tissues, of_element };
+        if !facts.change_constants(tiles, material, &new)? {
+            return Err(SUPPLE_E_MISMATCH.into());
+        }
+        let (nodes, elements) = ((*scene).nodes as usize, (*scene).elements as usize);
+        (*scene).facts = facts;
+        let mut arrays = Arrays::behind(scene.cast_const());
+        arrays.read::<NodeInertia>(nodes);
+        arrays.read::<ElementTile>(tiles_for(elements));
+        copy(arrays.change(tissues.len()), tissues);
+        Ok(())
     }
 }
 

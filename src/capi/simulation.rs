@@ -387,7 +387,7 @@ pub unsafe extern "C" fn supple_sim_advance(
 
 impl supple_settings {
     /// What can be said without a scene.
-    fn check(&self) -> Answer<()> {
+    pub(super) fn check(&self) -> Answer<()> {
         same_abi::<Self>(self.struct_size, self.abi)?;
         let none = SUPPLE_NONE as usize;
         check_choice(none, self.steps, SUPPLE_STEPS_LEARNED)?;
@@ -591,11 +591,55 @@ unsafe fn build(
     }
 }
 
+impl supple_sim {
+    pub(super) const fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    pub(super) const fn set_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+    }
+}
+
+/// Lets the steps go on as they are with other constants of the tissues, which `change` sets: exact ones look at the
+/// critical step again, long ones compute their inertia anew. Those that choose their length are refused first.
+///
+/// # Safety
+/// As at [`supple_sim_set`]; `change` leaves the steps alone.
+pub(super) unsafe fn keep_steps(sim: *mut supple_sim, change: impl FnOnce() -> Answer<()>) -> Answer<()> {
+    // SAFETY: the caller's promise; objects lie where they were put.
+    unsafe {
+        match &mut (*sim).prepared {
+            Prepared::None => return Err(SUPPLE_E_NO_STEP.into()),
+            Prepared::Auto(_) => return Err(SUPPLE_E_NULL.into()),
+            Prepared::Exact(exact) | Prepared::Learned { exact, .. } => {
+                change()?;
+                exact.pace.look_soon();
+            }
+            Prepared::Long { steps, .. } => {
+                let (model, _) = large::opened(sim.cast::<u8>().add(*steps).cast())?;
+                change()?;
+                model.renew_soon();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The points of its scene at rest, m.
+///
+/// # Safety
+/// As at [`memory::read`]; it is a simulation.
+pub(super) unsafe fn points_of<'a>(sim: *const supple_sim) -> &'a [[f32; 3]] {
+    // SAFETY: the caller's promise.
+    unsafe { Arrays::behind(sim).read((*sim).nodes as usize) }
+}
+
 /// The objects.
 ///
 /// # Safety
 /// As at [`memory::change`].
-unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
+pub(super) unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
     // SAFETY: the caller's promise; objects lie where they were put.
     unsafe {
         memory::is(sim.cast_const())?;
@@ -629,7 +673,7 @@ unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
 ///
 /// # Safety
 /// As at [`supple_sim_set`].
-unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()> {
+pub(super) unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()> {
     // SAFETY: the caller's promise.
     unsafe {
         let supple_sim_objects { scene, state, .. } = objects_of(sim)?;

@@ -262,6 +262,7 @@ impl From<MeshError> for supple_error {
             MeshError::Inverted { element, volume } => is(SUPPLE_E_MESH_INVERTED).at(element).value(volume, 0.0),
             MeshError::Table { places, nodes } => mismatch(places, nodes),
             MeshError::UnusedNode { node } => is(SUPPLE_E_MESH_UNUSED_NODE).node(node as u32),
+            MeshError::Marks { marks, elements } => mismatch(marks, elements),
         }
     }
 }

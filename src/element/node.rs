@@ -52,6 +52,10 @@ const FREE: f32 = 0.0;
 const FIXED: f32 = 1.0;
 const MOVED: f32 = 2.0;
 
+/// Of a node whose elements are all removed, kg: no real node has it (2^-60, a cube of water of 0.1 um). Its square and
+/// the inverse of that are still numbers.
+const ALONE: f32 = 8.673_617_4e-19;
+
 impl NodeInertia {
     /// A node without mass.
     pub const EMPTY: Self = Self { inverse: [0.0; 3], mass: 0.0 };
@@ -141,6 +145,18 @@ impl NodeInertia {
         } else {
             2
         }
+    }
+
+    /// Gives a node without mass that of one whose elements are all removed, so that nothing divides by zero.
+    pub(crate) fn leave_alone(&mut self) {
+        if self.mass == 0.0 {
+            self.mass = ALONE;
+        }
+    }
+
+    /// Whether all elements of the node are removed.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.mass == ALONE
     }
 
     /// Forgets what the mass has held so far.

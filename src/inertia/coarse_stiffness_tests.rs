@@ -80,7 +80,7 @@ fn prepare<M: ElementMaterial>(material: M, supports: &[Support], h: &Mat3, judg
     let mut storage = vec![NodeVector::ZERO; vectors_for(grid, pieces)];
     let mut matrices = Matrices::split(&mut storage, lattice, &renewal.bands, pieces).unwrap();
     assert!(matrices.write_constants(scene, lattice, places, &mut renewal));
-    matrices.frames.choose(lattice, places, &points);
+    matrices.frames.choose(lattice, places, &points, scene.inertia);
     let mut storage = vec![NodeVector([0.0, 0.0, 0.0, 1.0]); node_tables::vectors_for(points.len())];
     let mut tables = NodeTables::split(&mut storage, points.len()).unwrap();
     let moved = points.iter().map(|&x| {

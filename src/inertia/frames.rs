@@ -7,6 +7,7 @@ use glam::Mat3;
 
 use super::lattice::{Lattice, LatticeNode, nodes_of_cell};
 use crate::copy::copy;
+use crate::element::NodeInertia;
 use crate::simd::NodeVector;
 
 /// A 3 x 3 matrix by rows.
@@ -35,9 +36,15 @@ pub(super) struct Frames<'a> {
 
 impl Frames<'_> {
     /// Chooses four nodes for each function, far apart from each other.
-    pub(super) fn choose(&mut self, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) {
+    pub(super) fn choose(
+        &mut self,
+        lattice: &Lattice,
+        places: &[LatticeNode],
+        points: &[[f32; 3]],
+        inertia: &[NodeInertia],
+    ) {
         for (function, nodes) in self.nodes.iter_mut().enumerate() {
-            *nodes = choose(function, lattice, places, points);
+            *nodes = choose(function, lattice, places, (points, inertia));
         }
         self.latest.fill(IDENTITY);
     }
@@ -145,10 +152,17 @@ impl FrameNodes {
 
 /// Chooses among the nodes of a function: the node nearest to their centre, the one farthest from that, the one with
 /// the largest triangle, and the one with the largest tetrahedron.
-fn choose(function: usize, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) -> FrameNodes {
+fn choose(
+    function: usize,
+    lattice: &Lattice,
+    places: &[LatticeNode],
+    (points, inertia): (&[[f32; 3]], &[NodeInertia]),
+) -> FrameNodes {
+    // Those without an element left do not turn with the tissue.
+    let is_alone = |place: &&LatticeNode| inertia.get(place.node()).is_some_and(NodeInertia::is_alone);
     let nodes_of_function = || {
         let places = lattice.cells_of(function).into_iter().flatten().flat_map(|cell| nodes_of_cell(places, cell));
-        places.filter_map(|place| {
+        places.filter(|place| !is_alone(place)).filter_map(|place| {
             let (_, weight) = lattice.weights(place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
             Some((place.node() as u32, *points.get(place.node())?, weight))
         })

@@ -212,7 +212,7 @@ impl<'w> LargeModel<'w> {
         if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
             return singular;
         }
-        matrices.frames.choose(lattice, places, points);
+        matrices.frames.choose(lattice, places, points, scene.inertia);
         self.stiffening = [1.0; 2];
         let mut compared = self.step;
         for index in 0..self.stiffening.len() {
@@ -291,6 +291,12 @@ impl<'w> LargeModel<'w> {
         (self.step, self.prepared) = (step, step);
         let [first, longer] = self.stiffening;
         self.scaling = scaling_of(step, if step.seconds() > self.first { longer } else { first });
+        self.is_for_other_step = true;
+    }
+
+    /// Constants of the tissue have changed: the next step computes all inertia anew.
+    #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
+    pub(crate) const fn renew_soon(&mut self) {
         self.is_for_other_step = true;
     }
 

@@ -417,7 +417,7 @@ impl Lattice {
 
     /// Adds the masses (kg) of the nodes to those of the points.
     fn add_masses(&self, points: &[[f32; 3]], inertia: &[NodeInertia], masses: &mut [PointMass; MAX_POINTS]) {
-        for (&point, inertia) in points.iter().zip(inertia) {
+        for (&point, inertia) in points.iter().zip(inertia).filter(|(_, inertia)| !inertia.is_alone()) {
             let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
             let node = self.place(point);
             for (point, weight) in self.corner_points(node.cell()).into_iter().zip(node.eight_weights()) {

@@ -91,6 +91,13 @@ pub enum MeshError {
         /// The node.
         node: usize,
     },
+    /// There is not one mark of removal for each element.
+    Marks {
+        /// Marks.
+        marks: usize,
+        /// Elements of the mesh.
+        elements: usize,
+    },
 }
 
 impl fmt::Display for MeshError {
@@ -115,6 +122,9 @@ impl fmt::Display for MeshError {
                 write!(f, "a table of node numbers has {places} places, the mesh has {nodes} nodes")
             }
             Self::UnusedNode { node } => write!(f, "node {node} belongs to no element"),
+            Self::Marks { marks, elements } => {
+                write!(f, "{marks} marks of removed elements, the mesh has {elements} elements")
+            }
         }
     }
 }
@@ -145,6 +155,8 @@ pub struct Mesh<'a> {
     points: &'a [[f32; 3]],
     tets: &'a [[u32; 4]],
     turned: usize,
+    /// For each element whether it is removed; empty: none is.
+    removed: &'a [bool],
 }
 
 impl<'a> Mesh<'a> {
@@ -173,7 +185,20 @@ impl<'a> Mesh<'a> {
                 }
             }
         }
-        Ok(Self { points, tets, turned })
+        Ok(Self { points, tets, turned, removed: &[] })
+    }
+
+    /// The same mesh without the elements that are marked, as after a resection. Nodes and elements keep their numbers;
+    /// nodes without an element left are held where they are in scenes of it, and have no mass to speak of. No marks:
+    /// nothing is removed.
+    pub fn without(self, removed: &'a [bool]) -> Result<Self, MeshError> {
+        let (marks, elements) = (removed.len(), self.tets.len());
+        match removed {
+            [] => Ok(Self { removed, ..self }),
+            _ if marks != elements => Err(MeshError::Marks { marks, elements }),
+            _ if removed.iter().all(|&is_removed| is_removed) => Err(MeshError::Empty),
+            _ => Ok(Self { removed, ..self }),
+        }
     }
 
     /// Node coordinates, m.
@@ -182,7 +207,7 @@ impl<'a> Mesh<'a> {
         self.points
     }
 
-    /// Number of elements.
+    /// Number of elements, removed ones too.
     #[must_use]
     pub fn element_count(&self) -> usize {
         self.tets.len()
@@ -194,8 +219,19 @@ impl<'a> Mesh<'a> {
         self.turned
     }
 
-    /// Nodes of each element, in an order that gives a positive volume.
+    /// Nodes of each element that is not removed, in an order that gives a positive volume.
     pub fn tets(&self) -> impl Iterator<Item = [u32; 4]> + Clone + 'a {
+        self.elements().map(|(_, tet)| tet)
+    }
+
+    /// The same with the numbers of the elements.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = (usize, [u32; 4])> + Clone + 'a {
+        let mesh = *self;
+        self.all_tets().enumerate().filter(move |&(element, _)| !mesh.is_removed(element))
+    }
+
+    /// Removed ones too.
+    pub(crate) fn all_tets(&self) -> impl Iterator<Item = [u32; 4]> + Clone + 'a {
         let points = self.points;
         self.tets.iter().map(move |&[a, b, c, d]| {
             let tet = [a, b, c, d];
@@ -212,6 +248,15 @@ impl<'a> Mesh<'a> {
     #[cfg(feature = "capi-neo-hookean")]
     pub(crate) fn all_given(&self) -> &'a [[u32; 4]] {
         self.tets
+    }
+
+    pub(crate) fn is_removed(&self, element: usize) -> bool {
+        self.removed.get(element).is_some_and(|&is_removed| is_removed)
+    }
+
+    /// Whether some elements may be removed.
+    pub(crate) const fn has_removed(&self) -> bool {
+        !self.removed.is_empty()
     }
 
     /// Corners of an element, m, in float64.

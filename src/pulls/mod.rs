@@ -66,6 +66,23 @@ pub struct Pull {
     pub times: [f64; 2],
 }
 
+/// Shares a pull among those of its nodes that still belong to an element of the scene. Whether there are any: else it has
+/// nothing to pull.
+pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
+    let is_left = |node: u32| !scene.is_alone(node as usize);
+    if nodes.iter().all(|pulled| is_left(pulled.node)) {
+        return true;
+    }
+    let left: f32 = nodes.iter().filter(|pulled| is_left(pulled.node)).map(|pulled| pulled.weight).sum();
+    if left <= 0.0 {
+        return false;
+    }
+    for pulled in nodes {
+        pulled.weight = if is_left(pulled.node) { pulled.weight / left } else { 0.0 };
+    }
+    true
+}
+
 /// Where a pulled point is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]

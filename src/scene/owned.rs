@@ -22,9 +22,9 @@ pub trait SceneTables {
 /// A scene that owns its tables.
 #[derive(Clone, Debug)]
 pub struct Scene<M, S> {
-    material: M,
-    tables: S,
-    facts: SceneFacts,
+    pub(super) material: M,
+    pub(super) tables: S,
+    pub(super) facts: SceneFacts,
 }
 
 impl<M, S> Deref for Scene<M, S> {
@@ -106,6 +106,8 @@ pub struct VecTables {
     nodes: std::vec::Vec<NodeInertia>,
     tiles: std::vec::Vec<ElementTile>,
     patches: std::vec::Vec<PatchRow>,
+    /// Point masses, kg, with their nodes.
+    masses: std::vec::Vec<(usize, f32)>,
 }
 
 #[cfg(any(feature = "std", test))]
@@ -146,7 +148,7 @@ impl<M: Material> VecScene<M> {
             patches.truncate(facts.patch_rows);
             patches.shrink_to_fit();
         }
-        Ok(Self { material, tables: VecTables { nodes, tiles, patches }, facts })
+        Ok(Self { material, tables: VecTables { nodes, tiles, patches, masses: std::vec![] }, facts })
     }
 }
 
@@ -154,9 +156,24 @@ impl<M: Material> VecScene<M> {
 impl<M> VecScene<M> {
     /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
     pub fn add_mass(&mut self, node: usize, kilogram: f32) {
-        if let Some(inertia) = self.tables.nodes.get_mut(node) {
+        // One whose elements are all removed carries none.
+        if let Some(inertia) = self.tables.nodes.get_mut(node).filter(|inertia| !inertia.is_alone()) {
             inertia.add_mass(kilogram);
             self.facts.has_point_masses = true;
+            self.tables.masses.push((node, kilogram));
         }
+    }
+
+    /// A scene of the same nodes and supports, of another material and without some elements. Point masses stay.
+    pub(crate) fn exchanged(&self, material: M, mesh: &Mesh<'_>) -> Result<Self, BuildError>
+    where
+        M: Material,
+    {
+        let supports = std::vec::Vec::from_iter(self.view().supports());
+        let mut scene = Self::build(material, mesh, &supports)?;
+        for &(node, kilogram) in &self.tables.masses {
+            scene.add_mass(node, kilogram);
+        }
+        Ok(scene)
     }
 }

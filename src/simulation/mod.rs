@@ -16,6 +16,8 @@
 //! steps. Prescribed motions without a ramp go evenly over the call.
 
 mod clock;
+#[cfg(feature = "std")]
+mod exchange;
 mod mover;
 #[cfg(feature = "std")]
 mod owned;

@@ -5,6 +5,7 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
+use super::exchange::Changes;
 use super::{
     Clock, Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance,
 };
@@ -18,7 +19,7 @@ use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
 use crate::points::{PointError, VecPoints};
 use crate::pressure::VecPressure;
-use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, patch, usual_most};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, let_go, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -40,17 +41,19 @@ pub struct Simulation<'w> {
     pub instruments: Vec<Instrument<'w>>,
     /// What draws points of the tissue to targets ([`Simulation::pull`]).
     pub pulls: Vec<Pull>,
-    pulled: Vec<PulledNode>,
-    points: Vec<[f32; 3]>,
-    tets: Vec<[u32; 4]>,
-    scene: VecScene<VecMaterial>,
-    state: VecState,
+    pub(super) pulled: Vec<PulledNode>,
+    pub(super) points: Vec<[f32; 3]>,
+    pub(super) tets: Vec<[u32; 4]>,
+    pub(super) scene: VecScene<VecMaterial>,
+    pub(super) state: VecState,
     settings: Settings<'w>,
-    touchable: Touchable,
+    pub(super) touchable: Touchable,
+    /// What has been removed, and what is being ablated.
+    pub(super) changes: Changes,
     /// Room for where motions are in the next step.
     in_step: Vec<Motion>,
     /// None until the first call.
-    prepared: Option<Prepared<'w>>,
+    pub(super) prepared: Option<Prepared<'w>>,
     clock: Clock,
 }
 
@@ -59,7 +62,7 @@ type Touchable = (Vec<SurfaceNode>, Vec<[u32; 3]>);
 
 /// Steps of a method with their storage.
 #[derive(Debug)]
-enum Prepared<'w> {
+pub(super) enum Prepared<'w> {
     Exact(Exact),
     Long(Box<LargeStep<'w, Vec<NodeVector>>>, Option<Box<Guard<Vec<NodeVector>>>>),
     Auto(Box<Adaptive<'w, Vec<NodeVector>>>),
@@ -67,7 +70,7 @@ enum Prepared<'w> {
 }
 
 #[derive(Debug)]
-enum Exact {
+pub(super) enum Exact {
     Fixed(Step),
     Paced { pace: Pace, kept: Vec<NodeVector>, damping: f32 },
 }
@@ -113,6 +116,7 @@ impl<'w> Simulation<'w> {
             scene,
             settings: Settings::default(),
             touchable: (vec![], vec![]),
+            changes: Changes::default(),
             in_step: vec![],
             prepared: None,
             clock: Clock::default(),
@@ -134,16 +138,22 @@ impl<'w> Simulation<'w> {
     /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which
     /// instruments need that are thinner than edges are long.
     pub fn meeting(mut self, triangles: bool) -> Result<Self, SimulationError> {
-        let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?;
+        self.meet_boundary(triangles)?;
+        Ok(self)
+    }
+
+    pub(super) fn meet_boundary(&mut self, triangles: bool) -> Result<(), SimulationError> {
+        let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?.without(&self.changes.removed)?;
         let nodes = boundary(&mesh);
         let triangles = if triangles { boundary_triangles(&mesh, &nodes) } else { vec![] };
         self.meet(nodes, triangles)?;
-        Ok(self)
+        self.changes.meets_boundary = true;
+        Ok(())
     }
 
     /// The same with a surface of the caller's.
     pub fn meet(&mut self, nodes: Vec<SurfaceNode>, triangles: Vec<[u32; 3]>) -> Result<(), SimulationError> {
-        self.touchable = (nodes, triangles);
+        (self.touchable, self.changes.meets_boundary) = ((nodes, triangles), false);
         let surface = surface(&self.touchable, self.scene.node_count())?;
         self.state.make_room(&surface);
         Ok(())
@@ -165,6 +175,8 @@ impl<'w> Simulation<'w> {
             count?;
         }
         let count = self.pulled.len() - first;
+        // Of removed tissue alone it pulls nothing that moves.
+        let_go(self.scene.view(), self.pulled.get_mut(first..).unwrap_or_default());
         let most = usual_most(self.scene.view(), self.pulled.get(first..).unwrap_or_default());
         self.pulls.push(Pull { most, ..Pull::new([first as u32, count as u32], point, stiffness) });
         Ok(self.pulls.len() - 1)
@@ -188,6 +200,7 @@ impl<'w> Simulation<'w> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(SimulationError::Seconds(seconds));
         }
+        self.ablate_on()?;
         self.prepare_once()?;
         let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, settings, .. } = self;
         let (touchable, in_step, clock) = (&self.touchable, &mut self.in_step, &mut self.clock);
@@ -218,6 +231,7 @@ impl<'w> Simulation<'w> {
         mut loads: &mut dyn LoadsOverTime,
         watch: &mut dyn FnMut(Event<'_>),
     ) -> Result<Report, SimulationError> {
+        self.ablate_on()?;
         self.prepare_once()?;
         let Self { scene, state, prepared, settings, .. } = self;
         let work = settings.work();
@@ -457,6 +471,15 @@ pub enum SimulationError {
     NotFinite,
     /// A span (s) that cannot be.
     Seconds(f64),
+    /// An element to be removed or ablated that is not there.
+    Element {
+        /// Its number.
+        element: u32,
+        /// Elements of the mesh.
+        elements: usize,
+    },
+    /// An ablation to another law than that of the tissue, or of nothing, or to more tissues than there can be.
+    Ablation,
     /// A step was refused: the state is that before it.
     Refused(Divergence),
 }
@@ -477,6 +500,10 @@ impl fmt::Display for SimulationError {
             Self::Displacement(error) => error.fmt(f),
             Self::NotFinite => f.write_str("the stiffness of some element is not a finite number"),
             Self::Seconds(seconds) => write!(f, "advance by {seconds} s: it must be a positive number"),
+            Self::Element { element, elements } => {
+                write!(f, "element {element} does not exist, the mesh has {elements} elements")
+            }
+            Self::Ablation => f.write_str("an ablation needs elements that are there, and the law that the tissue has"),
             Self::Refused(divergence) => divergence.fmt(f),
         }
     }

@@ -7,6 +7,7 @@
 //! Algebraically the paper's `u+ = a dt^2 + 2 u - u-`, without its rounding ([`crate::state`]). Forces are
 //! taken at `t_n`, prescribed positions at `t_(n+1)`. SI units.
 
+mod carry_on;
 mod central_differences;
 mod critical;
 mod displace;
@@ -20,6 +21,9 @@ mod spectrum;
 #[cfg(feature = "std")]
 mod tangent;
 
+pub use carry_on::carry_on;
+#[cfg(feature = "capi-neo-hookean")]
+pub(crate) use carry_on::carry_on_in;
 pub use critical::critical_step;
 pub(crate) use critical::each_rate;
 pub use displace::{DisplacementError, displace};

@@ -81,7 +81,8 @@ static struct {
     uint64_t before;
     int written;
 } slots[SLOTS];
-static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, copies[4];
+static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, of_removed,
+    copies[4];
 static size_t weights_bytes, damper_bytes;
 static const char *doing;
 static supple_report report;
@@ -209,7 +210,13 @@ static supple_scene_config changed_bar(void) {
         }
     }
     supple_scene_config config = {SUPPLE_CONFIG(supple_scene_config), law, number(below(2)), nodes, elements, supports_there,
-                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0};
+                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0, NULL};
+    if (one_in(4)) {
+        uint8_t *removed = end_of(&of_removed, elements);
+        for (uint32_t n = 0; n < elements; n++) removed[n] = one_in(10);
+        if (one_in(20)) removed[below(elements)] = (uint8_t)number(2);
+        config.removed = removed;
+    }
     config.struct_size = number(config.struct_size), config.abi = number(config.abi), config.reserved = number(0);
     /* Fewer than there are, or none: more would be memory that is not the host's. */
     config.supports = one_in(20) ? below(supports_there + 1) : config.supports;
@@ -686,6 +693,14 @@ static supple_status use_sim(void) {
         return supple_set_gravity(objects.loads, gravity);
     }
     if (one_in(12)) return supple_state_reset(objects.state);
+    if (one_in(10)) {
+        /* Other tissues, or the state of another simulation. Stiff ones have short steps: the work of a call is bounded. */
+        supple_settings settings = some_settings();
+        settings.most_steps = 1 + below(30);
+        const supple_tissue others[2] = {{{wild(59.0f), 8.0f, 60000.0f, 0.0f}, 1000.0f}, {{100.0f, 8.0f, 60000.0f, 0.0f}, number(1000)}};
+        return one_in(2) ? supple_sim_set_tissues(sim, one_in(60) ? NULL : others, below(3), &settings, wanted())
+                         : supple_sim_carry_on(sim, object(SIM, 1), one_in(60) ? NULL : &settings, wanted());
+    }
     if (objects.contact != NULL && one_in(4)) {
         const supple_instrument ball = {number(SUPPLE_SPHERE), wild(0.01f), 0.0f, 0.3f, {{wild(0.05f), wild(0.05f), 0.03f}, {0, 0, 0, 1}}, NULL, 0};
         return supple_set_instruments(objects.contact, &ball, below(2), wanted());
@@ -794,7 +809,7 @@ static supple_status other(void) {
     supple_learned_facts facts;
     supple_scene_facts of_scene;
     switch (below(6)) {
-        case 4: return supple_state_stop(object(SCENE, 0), object(STATE, 1));
+        case 4: return one_in(2) ? supple_state_stop(object(SCENE, 0), object(STATE, 1)) : supple_state_carry_on(object(SCENE, 0), object(STATE, 1));
         case 5: return supple_learned_fall_back(object(LEARNED, 1), object(STATE, 0));
         case 0: return supple_scene_describe(object(SCENE, 0), one_in(20) ? NULL : &of_scene);
         case 1: return supple_learned_describe(object(LEARNED, 0), one_in(20) ? NULL : &facts);
@@ -888,7 +903,7 @@ int main(int argc, char **argv) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;
     }
-    of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
+    of_removed = arena_of(TETS), of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
     of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 13);
     of_rest = arena_of(supple_settle_size(NODES) + 64);

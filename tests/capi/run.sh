@@ -36,7 +36,7 @@ find_python() {
 programs() {
     cargo build --quiet --release
     local test options element
-    for test in misuse sizes copies simulation switching points heap threads stack; do
+    for test in misuse sizes copies simulation exchange switching points heap threads stack; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         for element in SUPPLE_NODAL_PRESSURE SUPPLE_LINEAR; do
@@ -44,7 +44,7 @@ programs() {
             "$folder/$test"
         done
     done
-    for test in sizes copies simulation switching points heap threads stack strain; do
+    for test in sizes copies simulation exchange switching points heap threads stack strain; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         gcc -std=c11 "${warnings[@]}" "${options[@]}" -DELEMENT=SUPPLE_NODAL_STRAIN tests/capi/$test.c "$static" -o "$folder/$test-strain"

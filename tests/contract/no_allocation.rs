@@ -97,6 +97,38 @@ fn the_allocator_counts() {
 }
 
 #[test]
+fn an_exchange_allocates_nothing() {
+    let (points, tets) = mesh();
+    let (mut scene, mut state) = (FixedScene::<_, NODES, TILES>::new(TISSUE), FixedState::<NODES>::new());
+    let before = allocations();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    scene.build(&mesh, &supports()).unwrap();
+    let (mut taken, mut removed) = (0, [false; TETS]);
+    removed[TETS - 30..].fill(true);
+    for stage in 0..4 {
+        match stage {
+            0 => {}
+            1 | 3 => {
+                let law = AnyLaw::Exponential(Exponential { a: 59.0 + stage as f32, b: 8.023, d: 60_000.0 });
+                assert!(scene.set_constants(Tissue { law, ..TISSUE }).unwrap());
+                assert!(tled::carry_on(&scene, &mut state));
+            }
+            _ => {
+                scene.build(&mesh.without(&removed).unwrap(), &supports()).unwrap();
+                assert!(tled::carry_on(&scene, &mut state));
+            }
+        }
+        let critical = tled::critical_step(&scene, &mut state).unwrap();
+        let step = Step::new(0.5 * critical.seconds, 5.0, critical).unwrap();
+        let loads = Loads::new(&scene, [0.0, 2.0, -9.81], &[], &[]).unwrap();
+        for _ in 0..50 {
+            taken += u32::from(tled::step(&scene, &loads, &mut state, &step) == Status::Ok);
+        }
+    }
+    assert_eq!((taken, allocations()), (200, before));
+}
+
+#[test]
 fn building_and_stepping_in_statics_allocates_nothing() {
     let (points, tets) = mesh();
     let (mut scene, mut state) = (SCENE.lock().unwrap(), STATE.lock().unwrap());

@@ -269,6 +269,34 @@ void refused(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.step(scene, loads, 10)));
 }
 
+// A cube loses its top layer, then becomes stiffer, in motion.
+void changed() {
+    const grid mesh(3);
+    const auto how = supple::settings(supple::steps::exact, 20);
+    supple::body body = mesh.body();
+    const std::size_t elements = mesh.tets.size() / 4, words = supple::lines(supple::simulation::size(body, how).value);
+    std::vector<supple::line> first(words), second(words);
+    const auto whole = supple::simulation::make(first, body, how);
+    EXPECT(whole && is_done(whole.value.loads().set_gravity({1, 0, 0})) && is_done(whole.value.advance(0.05)));
+    std::vector<std::uint8_t> removed(elements, 0);
+    std::fill(removed.end() - long(elements / 3), removed.end(), std::uint8_t(1));
+    body.removed = {removed.data(), 3};
+    EXPECT(supple::simulation::size(body, how).status == status::e_short);
+    body.removed = removed;
+    const auto part = supple::simulation::make(second, body, how);
+    EXPECT(part && part.value.scene().describe().value.elements == elements - elements / 3);
+    supple::error error;
+    EXPECT(part.value.carry_on(part.value, how) == status::e_overlap);
+    EXPECT(is_done(part.value.carry_on(whole.value, how, &error)) && part.value.state().now().value.seconds > 0.049);
+    EXPECT(is_done(part.value.advance(0.05)) && is_done(whole.value.advance(0.05)));
+    supple::tissue stiff[] = {body.tissues.data()[0]};
+    stiff[0].constants[0] *= 2;
+    EXPECT(is_done(part.value.set_tissues(stiff)) && is_done(part.value.set_tissues(stiff, how)));
+    EXPECT(is_done(part.value.scene().set_tissues(stiff)) && is_done(part.value.state().carry_on(part.value.scene())));
+    stiff[0].density *= 2;
+    EXPECT(part.value.set_tissues(stiff, how, &error) == status::e_mismatch && is_done(part.value.advance(0.05)));
+}
+
 // All of it in one memory: what is refused, a ball that presses, a copy that goes on, and other steps.
 void simulated(const char *path) {
     const grid mesh(3);
@@ -503,6 +531,7 @@ int main(int count, char **words) {
     remarked(scene.value, loads.value, state.value);
     refused(scene.value, loads.value, state.value);
     simulated(words[1]);
+    changed();
     thin();
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;

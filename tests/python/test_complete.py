@@ -17,6 +17,8 @@ ADVANCED = {
     "supple_set_level": "for comparisons of instruction sets; the best is chosen by itself",
     "supple_copy_displacements": "Simulation.displacements is a view; numpy copies it",
     "supple_copy_positions": "numpy adds points and displacements",
+    "supple_state_carry_on": "Simulation.exchange lets the state go on",
+    "supple_set_tissues": "Simulation.ablate changes those of the simulation",
     "supple_set_pull": "Pulls.release ends pulls, Simulation.pull makes others",
     "supple_add_pull_of_nodes": "for springs and points of hosts with weights of their own; Simulation.pull takes patches",
     **dict.fromkeys(["supple_loads_size", "supple_loads_init", "supple_state_size", "supple_state_init"], BY_THE_SIMULATION),

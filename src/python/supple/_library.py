@@ -101,19 +101,19 @@ def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.floa
     return np.ascontiguousarray(array, np.float32)
 
 
-def node_numbers(selection: Any, nodes: int, what: str) -> NDArray[np.uint32]:
-    """Numbers of nodes from numbers or from a mask over all nodes."""
+def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> NDArray[np.uint32]:
+    """Numbers of nodes, or of elements, from numbers or from a mask over all of them."""
     array = np.asarray(selection)
     if array.dtype == bool:
         if array.shape != (nodes,):
-            raise errors.InputError(f"{what}: a mask of shape {array.shape}, there are {nodes} nodes")
+            raise errors.InputError(f"{what}: a mask of shape {array.shape}, there are {nodes} {kind}s")
         array = np.flatnonzero(array)
     array = np.atleast_1d(array)
     if array.size == 0:
         return np.zeros(0, np.uint32)
     if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
-        raise errors.InputError(f"{what}: numbers of nodes or a mask are needed, not {array.dtype} of shape {array.shape}")
+        raise errors.InputError(f"{what}: numbers of {kind}s or a mask are needed, not {array.dtype} of shape {array.shape}")
     bad = np.flatnonzero((array < 0) | (array >= nodes))
     if len(bad):
-        raise errors.InputError(f"{what}: entry {bad[0]} is node {array[bad[0]]}, there are {nodes} nodes")
+        raise errors.InputError(f"{what}: entry {bad[0]} is {kind} {array[bad[0]]}, there are {nodes} {kind}s")
     return array.astype(np.uint32)

@@ -89,10 +89,7 @@ class Mesh:
 
     def boundary(self) -> NDArray[np.uint32]:
         """The triangles that belong to one tetrahedron only, of shape (k, 3), seen from outside."""
-        faces, count = np.empty((4 * len(self.tets), 3), np.uint32), ffi.new("uint32_t *")
-        tets, triangles = (library.pointer("uint32_t", array) for array in (self.tets, faces))
-        library.checked(lib.supple_boundary(tets, len(self.tets), triangles, len(faces), count), what="the boundary")
-        return faces[: count[0]].copy()
+        return boundary_of(self.tets)
 
     @property
     def volumes(self) -> NDArray[np.float64]:
@@ -103,6 +100,14 @@ class Mesh:
 
     def __repr__(self) -> str:
         return f"<supple.Mesh: {len(self.points)} nodes, {len(self.tets)} tetrahedra>"
+
+
+def boundary_of(tets: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """See `Mesh.boundary`."""
+    faces, count = np.empty((4 * len(tets), 3), np.uint32), ffi.new("uint32_t *")
+    given, triangles = (library.pointer("uint32_t", array) for array in (tets, faces))
+    library.checked(lib.supple_boundary(given, len(tets), triangles, len(faces), count), what="the boundary")
+    return faces[: count[0]].copy()
 
 
 def _regions(regions: ArrayLike, elements: int) -> NDArray[np.int32]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Mapping
 
@@ -12,7 +13,7 @@ from . import _library as library
 from ._laws import LAWS
 from ._library import ffi, lib
 from .errors import InputError
-from .mesh import Mesh
+from .mesh import Mesh, boundary_of
 
 # As supple_tissue.
 _TISSUE = np.dtype([("constants", np.float32, 4), ("density", np.float32)])
@@ -61,6 +62,8 @@ class Scene:
     moved : nodes that will be held where `Simulation.set_motions` says
     element : "nodal-pressure", "nodal-strain" (bends right on coarse meshes), or "linear" (locks in nearly incompressible tissue)
     axes : along which the fixed nodes are held
+    removed : elements that are not there, as numbers or as a mask over all, as after a resection: nodes and elements keep their numbers, and
+        nodes without an element are held
     """
 
     def __init__(
@@ -72,16 +75,21 @@ class Scene:
         moved: ArrayLike = (),
         element: str = "nodal-pressure",
         axes: str = "xyz",
+        removed: ArrayLike = (),
     ) -> None:
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
-        nodes, elements = len(mesh.points), len(mesh.tets)
         self._supports = self._supports_of(fixed, moved, axes)
-        law, self._tissues, self._tissue_of_element = self._tissues_of(material)
-        tissues = len(self._tissues)
+        self._law, self._tissues, self._tissue_of_element = self._tissues_of(material)
+        self._removed = np.zeros(len(mesh.tets), np.uint8)
+        self._removed[library.node_numbers(removed, len(mesh.tets), "removed", "element")] = 1
+        self._build()
+
+    def _build(self) -> None:
+        mesh, nodes, elements, tissues = self.mesh, len(self.mesh.points), len(self.mesh.tets), len(self._tissues)
         made = library.config("supple_scene_config")
-        made.law, made.element, made.winding = law, ELEMENTS[element], lib.SUPPLE_WINDING_CHECKED
+        made.law, made.element, made.winding = self._law, ELEMENTS[self.element], lib.SUPPLE_WINDING_CHECKED
         made.nodes, made.elements, made.supports, made.tissues = nodes, elements, len(self._supports), tissues
         made.points = library.pointer("float", mesh.points)
         made.tetrahedra = library.pointer("uint32_t", mesh.tets)
@@ -89,10 +97,12 @@ class Scene:
         made.tissue = library.pointer("supple_tissue", self._tissues)
         if tissues > 1:
             made.tissue_of_element = library.pointer("uint16_t", self._tissue_of_element)
+        if self._removed.any():
+            made.removed = library.pointer("uint8_t", self._removed)
         self._config = made
         # Each simulation builds its own; this one says what is wrong with it, and what it takes.
         size = lib.supple_scene_size(nodes, elements, tissues)
-        if element == "nodal-strain":
+        if self.element == "nodal-strain":
             size += lib.supple_patches_size(nodes, elements, tissues)
         memory = library.Memory(size)
         scene, error = ffi.new("supple_scene **"), library.new_error()
@@ -100,6 +110,14 @@ class Scene:
         facts = ffi.new("supple_scene_facts *")
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
+
+    def _changed(self, removed: NDArray[np.uint8], tissues: NDArray[np.void], of_element: NDArray[np.uint16]) -> Scene:
+        """Another scene of the same mesh and supports."""
+        made = copy.copy(self)
+        made.__dict__.pop("_boundary", None)
+        made._removed, made._tissues, made._tissue_of_element = removed, tissues, of_element
+        made._build()
+        return made
 
     def _tissues_of(self, material: Material | Mapping[int, Material]) -> tuple[int, NDArray[np.void], NDArray[np.uint16]]:
         """The law, the tissues, and of which each element is."""
@@ -124,7 +142,7 @@ class Scene:
 
     @functools.cached_property
     def _boundary(self) -> NDArray[np.uint32]:
-        return self.mesh.boundary()
+        return boundary_of(np.ascontiguousarray(self.mesh.tets[self._removed == 0]))
 
     @functools.cached_property
     def _edge(self) -> float:

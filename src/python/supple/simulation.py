@@ -18,12 +18,13 @@ from . import _library as library
 from ._laws import LAWS
 from ._library import ffi, lib
 from .errors import InputError
+from .exchange import Ablation, ablated, exchanged, made_of, next_stage
 from .images import Field, field_of
 from .instruments import POINT, Contact, Instrument, Rows, Touch, need_triangles
 from .points import FollowedPoints
 from .pulls import PullMemory, Pulls, Wanted, wanted_of
 from .reactions import Reaction
-from .scene import ELEMENTS, Scene, axes_of
+from .scene import ELEMENTS, Material, Scene, axes_of
 
 _STEPS = {
     "exact": lib.SUPPLE_STEPS_EXACT,
@@ -203,22 +204,23 @@ class Simulation:
         if weights is not None and method != "exact":
             self._weights = _weights(weights)
             settings.weights, settings.weights_bytes = self._weights.pointer, self._weights.size
-        size, error, made = ffi.new("size_t *"), library.new_error(), ffi.new("supple_sim **")
-        library.checked(lib.supple_sim_size(scene._config, settings, size, error), error, method)
-        self._memory = library.Memory(size[0])
-        status = lib.supple_sim_setup(self._memory.pointer, size[0], scene._config, settings, made, error)
-        library.checked(status, error, method if weights is None else f"{method}: {weights}")
-        self._sim, objects = made[0], ffi.new("supple_sim_objects *")
-        library.checked(lib.supple_sim_describe(self._sim, objects))
-        self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
+        self._adopt(*made_of(scene, settings, method if weights is None else f"{method}: {weights}"))
+        self._ablations = list[Ablation]()
         self._contact: Contact | None = None
         self._pull_memory: PullMemory | None = None
         self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
-        self._vectors = self._view_of_displacements()
         self.gravity = gravity
+
+    def _adopt(self, memory: library.Memory, sim: Any) -> None:
+        """Moves this one from now on."""
+        objects = ffi.new("supple_sim_objects *")
+        library.checked(lib.supple_sim_describe(sim, objects))
+        self._memory, self._sim = memory, sim
+        self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
+        self._vectors = self._view_of_displacements()
 
     # Loads.
 
@@ -424,6 +426,30 @@ class Simulation:
             first += len(group.points)
         raise InputError("these pulls were released")
 
+    # Tissue that changes.
+
+    @_one_at_a_time
+    def exchange(self, scene: Scene) -> None:
+        """Goes on in another scene of the same points: displacements, velocities, time, loads, pulls and instruments stay, so what stays of the
+        tissue keeps its momentum. Where it is refused nothing has changed. Views of `displacements` are to be taken anew, and reactions."""
+        exchanged(self, scene)
+        self._ablations = []
+
+    @_one_at_a_time
+    def remove(self, elements: ArrayLike) -> None:
+        """Removes elements, as numbers or as a mask over all, as a resection does: see `exchange`. Nodes without an element stay in all
+        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed."""
+        scene = self.scene
+        removed = scene._removed.copy()
+        removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
+        exchanged(self, scene._changed(removed, scene._tissues, scene._tissue_of_element))
+
+    @_one_at_a_time
+    def ablate(self, elements: ArrayLike, material: Material, seconds: float) -> None:
+        """Lets the constants of some elements, as numbers or as a mask, change evenly to those of a material of the same law over so many
+        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities stay. See `exchange`."""
+        ablated(self, elements, material, seconds)
+
     # Supports.
 
     @_one_at_a_time
@@ -499,6 +525,7 @@ class Simulation:
         if not (np.isfinite(seconds) and seconds > 0.0):
             raise InputError(f"advance by {seconds} s: it must be a positive number")
         self._warn_once()
+        next_stage(self)
         report = ffi.new("supple_sim_report *")
         status = lib.supple_sim_advance(self._sim, seconds, self._threads, report)
         call, estimate = report.call, report.estimate

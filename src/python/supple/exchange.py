@@ -1,0 +1,115 @@
+"""Tissue that changes while it moves: another scene under the same motion, and constants on their way."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _library as library
+from ._library import ffi, lib
+from .errors import InputError
+from .instruments import Contact
+from .scene import Material, Scene
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+# How often an ablation changes the constants.
+_STAGES = 20
+
+
+@dataclasses.dataclass
+class Ablation:
+    """Constants (Pa) of a tissue on their way, from a time on (s)."""
+
+    tissue: int
+    begin: NDArray[np.float32]
+    end: NDArray[np.float32]
+    start: float
+    seconds: float
+    stage: int = 0
+
+    def stage_at(self, now: float) -> int:
+        # What rounding of the time lacks does not cost a stage.
+        share = min(max((now - self.start) / self.seconds, 0.0), 1.0) if self.seconds > 0.0 else 1.0
+        return int(share * _STAGES + 1e-6)
+
+
+def made_of(scene: Scene, settings: Any, what: str) -> tuple[library.Memory, Any]:
+    """A simulation at rest, with its memory."""
+    size, error, made = ffi.new("size_t *"), library.new_error(), ffi.new("supple_sim **")
+    library.checked(lib.supple_sim_size(scene._config, settings, size, error), error, what)
+    memory = library.Memory(size[0])
+    library.checked(lib.supple_sim_setup(memory.pointer, size[0], scene._config, settings, made, error), error, what)
+    return memory, made[0]
+
+
+def exchanged(simulation: Simulation, scene: Scene) -> None:
+    """See `Simulation.exchange`."""
+    settings, contact, error = simulation._settings, simulation._contact, library.new_error()
+    memory, sim = made_of(scene, settings, simulation.method)
+    objects = ffi.new("supple_sim_objects *")
+    library.checked(lib.supple_sim_describe(sim, objects))
+    if contact is not None:
+        former, contact = contact, Contact(scene.mesh.points, scene._boundary, objects.scene, contact.triangles, contact.grips)
+        library.checked(lib.supple_contact_carry_on(contact.raw, objects.scene, former.raw), what="instruments")
+        contact._rows = former._rows
+    library.checked(lib.supple_sim_carry_on(sim, simulation._sim, settings, error), error, "exchange")
+    if contact is not None and contact.list:
+        library.checked(lib.supple_set_contact(objects.loads, contact.raw))
+    simulation.scene, simulation._contact = scene, contact
+    simulation._adopt(memory, sim)
+
+
+def ablated(simulation: Simulation, elements: ArrayLike, material: Material, seconds: float) -> None:
+    """See `Simulation.ablate`."""
+    scene = simulation.scene
+    numbers = library.node_numbers(elements, len(scene.mesh.tets), "ablate", "element")
+    if material._number != scene._law:
+        raise InputError(f"ablate: the material is {material.law}, another law than that of the tissue")
+    if not (np.isfinite(seconds) and seconds >= 0.0):
+        raise InputError(f"ablate within {seconds} s: it must be zero or more")
+    if not len(numbers):
+        raise InputError("ablate: there are no elements")
+    end = np.zeros(4, np.float32)
+    end[: len(material.constants)] = list(material.constants.values())
+    if not (np.isfinite(end).all() and (end[: len(material.constants)] > 0.0).all()):
+        raise InputError(f"ablate: {material!r}: constants must be finite and positive")
+    # Of each tissue its ablated part becomes one of its own.
+    of_element, parts = scene._tissue_of_element.copy(), np.unique(scene._tissue_of_element[numbers])
+    first = len(scene._tissues)
+    tissues = np.concatenate([scene._tissues, scene._tissues[parts]])
+    of_element[numbers] = first + np.searchsorted(parts, scene._tissue_of_element[numbers])
+    exchanged(simulation, scene._changed(scene._removed, tissues, of_element))
+    now = simulation.time
+    for place in range(first, len(tissues)):
+        simulation._ablations.append(Ablation(place, tissues["constants"][place].copy(), end, now, seconds))
+
+
+def next_stage(simulation: Simulation) -> None:
+    """The next stage of each ablation, if it is due."""
+    if not simulation._ablations:
+        return
+    now, tissues, error = simulation.time, simulation.scene._tissues.copy(), library.new_error()
+    due = [ablation for ablation in simulation._ablations if ablation.stage_at(now) > ablation.stage]
+    if not due:
+        return
+    for ablation in due:
+        share = ablation.stage_at(now) / _STAGES
+        tissues["constants"][ablation.tissue] = ablation.begin + share * (ablation.end - ablation.begin)
+    rows = library.pointer("supple_tissue", tissues)
+    # Long steps are prepared anew at the end.
+    is_last = any(ablation.stage_at(now) == _STAGES for ablation in due)
+    settings = simulation._settings if is_last or simulation.method == "auto" else ffi.NULL
+    status = lib.supple_sim_set_tissues(simulation._sim, rows, len(tissues), settings, error)
+    library.checked(status, error, "ablation")
+    for ablation in due:
+        ablation.stage = ablation.stage_at(now)
+    simulation._ablations = [ablation for ablation in simulation._ablations if ablation.stage < _STAGES]
+    scene = copy.copy(simulation.scene)
+    scene._tissues = tissues
+    simulation.scene = scene

@@ -1,0 +1,117 @@
+"""Tissue that changes while it moves: resection, ablation, and what is refused."""
+
+import numpy as np
+import pytest
+import supple
+from conftest import bar
+
+
+def scene_of(mesh, material, element="nodal-strain", **more):
+    return supple.Scene(mesh, material, fixed=mesh.points[:, 2] < 1e-6, element=element, **more)
+
+
+def centres(mesh):
+    return mesh.points[mesh.tets].mean(axis=1)
+
+
+def momentum_of(mesh, velocities, stay):
+    share = np.zeros(len(mesh.points))
+    np.add.at(share, mesh.tets[stay], mesh.volumes[stay, None] / 4.0)
+    return 1000.0 * (share[:, None] * velocities).sum(axis=0)
+
+
+@pytest.mark.parametrize("element", ["linear", "nodal-pressure", "nodal-strain"])
+@pytest.mark.parametrize("method", ["exact", "long"])
+def test_elements_go_and_the_rest_goes_on(soft, element, method):
+    mesh = bar(cells=(4, 4, 12))
+    gone = (centres(mesh)[:, 2] > 0.03) & (centres(mesh)[:, 0] > 0.01)
+    simulation = supple.Simulation(scene_of(mesh, soft, element), method, damping=30.0, gravity=(2.0, 0.0, 0.0), guard=False)
+    simulation.set_forces([len(mesh.points) - 1], [0.0, 1e-5, 0.0])
+    simulation.advance(0.05)
+    before, old = momentum_of(mesh, simulation.velocities, ~gone), simulation.displacements
+    time, moved = simulation.time, old.copy()
+    simulation.remove(gone)
+    assert simulation.time == time and (simulation.displacements == moved).all()
+    # Nodes that are alone stand still, the others keep their velocity.
+    assert momentum_of(mesh, simulation.velocities, ~gone) == pytest.approx(before, rel=1e-5, abs=1e-9)
+    alone = np.setdiff1d(np.arange(len(mesh.points)), mesh.tets[~gone])
+    assert len(alone) > 10 and not simulation.velocities[alone].any()
+    for _ in range(100):
+        assert simulation.advance(0.02).ok
+    never = supple.Simulation(scene_of(mesh, soft, element, removed=gone), method, damping=30.0, gravity=(2.0, 0.0, 0.0), guard=False)
+    for _ in range(102):
+        never.advance(0.02)
+    left = np.unique(mesh.tets[~gone])
+    off = np.linalg.norm(simulation.displacements - never.displacements, axis=1)[left].max()
+    way = np.linalg.norm(never.displacements[left], axis=1).max()
+    print(f"{element}, {method}: {1e3 * off:.4f} of {1e3 * way:.2f} mm")
+    assert off < 0.02 * way and abs(simulation.displacements[alone] - moved[alone]).max() < 1e-8
+    # What was a view is one of the former motion.
+    assert (old == moved).all()
+
+
+def test_an_ablation_ends_where_a_body_is_that_was_so_from_the_start(soft):
+    mesh = bar(cells=(3, 3, 10))
+    region = (centres(mesh)[:, 2] > 0.015) & (centres(mesh)[:, 2] < 0.04)
+    stiff = supple.Material.from_moduli(15000.0, 0.45, density=1000.0)
+    simulation = supple.Simulation(scene_of(mesh, soft), damping=30.0, gravity=(4.0, 0.0, 0.0))
+    simulation.advance(0.2)
+    simulation.ablate(np.flatnonzero(region), stiff, 0.4)
+    seen = set()
+    for _ in range(100):
+        simulation.advance(0.02)
+        seen.add(float(simulation.scene._tissues["constants"][1, 0]))
+    assert len(seen) == 21 and max(seen) == pytest.approx(stiff.constants["c"]) and not simulation._ablations
+    parts = supple.Mesh(mesh.points, mesh.tets, regions=region.astype(int))
+    always = supple.Simulation(scene_of(parts, {0: soft, 1: stiff}), damping=30.0, gravity=(4.0, 0.0, 0.0))
+    always.advance(2.2)
+    off, way = abs(simulation.displacements - always.displacements).max(), abs(always.displacements).max()
+    print(f"{1e3 * off:.4f} of {1e3 * way:.2f} mm")
+    assert off < 0.002 * way
+    # Again, and at once; and with some of it removed.
+    simulation.ablate(region, soft, 0.0)
+    simulation.remove(np.flatnonzero(centres(mesh)[:, 2] > 0.05))
+    assert simulation.advance(0.1).ok and len(simulation.scene._tissues) == 3
+
+
+def test_instruments_and_pulls_follow(soft):
+    mesh = bar(cells=(4, 4, 12))
+    simulation = supple.Simulation(scene_of(mesh, soft), damping=30.0)
+    simulation.set_instruments([supple.Instrument.sphere(0.008, (0.01, 0.01, 0.08))], grips=30)
+    pulls = simulation.pull([[0.01, 0.0, 0.06], [0.0, 0.01, 0.04]], [[0.01, -0.005, 0.06], [-0.004, 0.01, 0.04]], radius=0.006)
+    simulation.advance(0.1)
+    assert (np.linalg.norm(pulls.forces, axis=1) > 1e-3).all()
+    simulation.remove(centres(mesh)[:, 2] > 0.045)
+    # The new surface is 15 mm lower.
+    simulation.move(0, (0.01, 0.01, 0.045 + 0.008 - 0.003), within=0.4)
+    for _ in range(25):
+        simulation.advance(0.02)
+    touch = simulation.touch(0)
+    middle = np.flatnonzero(np.isclose(mesh.points, [0.01, 0.01, 0.045], atol=1e-6).all(axis=1))
+    print(touch.force, simulation.displacements[middle])
+    assert touch.force[2] > 1e-3 and simulation.displacements[middle[0], 2] < -0.0015
+    assert not pulls.forces[0].any() and np.linalg.norm(pulls.forces[1]) > 1e-3
+
+
+def test_what_cannot_be_is_refused_and_the_motion_goes_on(soft):
+    mesh, other = bar(), bar(size=(0.02, 0.02, 0.05))
+    exponential = supple.Material("exponential", a=1500.0, b=8.0, d=40000.0, density=1060.0)
+    simulation, undisturbed = (supple.Simulation(scene_of(mesh, soft), gravity=(1.0, 0.0, 0.0)) for _ in range(2))
+    for each in (simulation, undisturbed):
+        each.advance(0.05)
+    bad = supple.Material("neo-hookean", c=float("nan"), d=1.0, density=1000.0)
+    for wrong, words in [
+        (lambda: simulation.exchange(scene_of(other, soft)), "exchange: .*node"),
+        (lambda: simulation.remove([len(mesh.tets)]), f"remove: entry 0 is element {len(mesh.tets)}"),
+        (lambda: simulation.remove(np.ones(len(mesh.tets), bool)), "the scene: "),
+        (lambda: simulation.remove(np.ones(3, bool)), r"a mask of shape \(3,\), there are \d+ elements"),
+        (lambda: simulation.ablate([0], exponential, 1.0), "another law"),
+        (lambda: simulation.ablate([], soft, 1.0), "there are no elements"),
+        (lambda: simulation.ablate([0], soft, -1.0), "-1.0 s"),
+        (lambda: simulation.ablate([0], bad, 1.0), "finite and positive"),
+    ]:
+        with pytest.raises(supple.InputError, match=words):
+            wrong()
+    for each in (simulation, undisturbed):
+        each.advance(0.05)
+    assert (simulation.displacements == undisturbed.displacements).all()
