@@ -7,6 +7,7 @@ use crate::contact::{
     Contact, ContactPoint, Field, Grip, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceNode, Touch,
     vectors_to_push,
 };
+use crate::copy::copy;
 use crate::state::{NodeVector, StateView};
 
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for};
@@ -442,7 +443,8 @@ pub unsafe extern "C" fn supple_contact_carry_on(
         if count > parts.grips.len() {
             return Err(supple_error::from(SUPPLE_E_CAPACITY).value(count as f64, parts.grips.len() as f64));
         }
-        (object.list, object.instruments, object.grips) = (old.list, old.instruments, 0);
+        copy(&mut object.list, &old.list);
+        (object.instruments, object.grips) = (old.instruments, 0);
         for grip in still() {
             insert(parts.grips, &mut object.grips, grip);
         }

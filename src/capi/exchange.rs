@@ -1,5 +1,7 @@
 //! Tissue that changes while it moves, for C: another scene of the same nodes, and other constants.
 
+use core::slice::{from_mut, from_ref};
+
 use crate::copy::copy;
 use crate::material::TissueValues;
 use crate::tled;
@@ -139,7 +141,7 @@ pub unsafe extern "C" fn supple_sim_carry_on(
         copy(to.displacement, before.displacement);
         copy(to.remainder, before.remainder);
         copy(to.increment, before.increment);
-        *to.progress = *before.progress;
+        copy(from_mut(to.progress), from_ref(before.progress));
         tled::carry_on_in(open.view(), to);
         let clock = (*from).clock();
         (*sim).set_clock(clock);

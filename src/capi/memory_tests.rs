@@ -97,6 +97,7 @@ fn scene(element: u32) -> Memory {
         tissue_of_element: of_element.as_ptr(),
         element,
         reserved: 0,
+        removed: core::ptr::null(),
     };
     let patches = if element == SUPPLE_NODAL_STRAIN { supple_patches_size(NODES, ELEMENTS, 2) } else { 0 };
     let mut memory = Memory::new(supple_scene_size(NODES, ELEMENTS, 2) + patches);

@@ -1,8 +1,9 @@
 //! What is simulated, for C: built once from the host's mesh, read only from then on.
 
 use core::ffi::c_void;
+use core::slice::from_mut;
 
-use crate::copy::copy;
+use crate::copy::copy_apart;
 use crate::element::{ElementTile, NodeInertia, PatchRow};
 use crate::material::{Element, TissueValues};
 use crate::mesh::{Mesh, Winding};
@@ -437,18 +438,19 @@ pub(super) unsafe fn set_tissues(scene: *mut supple_scene, tissues: &[TissueValu
         if tissues.len() != material.tissues.len() {
             return Err(mismatch(tissues.len(), material.tissues.len()));
         }
-        let mut facts = **facts;
         let &SceneMaterial { element, law, of_element, .. } = material;
         let new = SceneMaterial { element, law, tissues, of_element };
+        let mut changed = [**facts];
+        let [facts] = &mut changed;
         if !facts.change_constants(tiles, material, &new)? {
             return Err(SUPPLE_E_MISMATCH.into());
         }
         let (nodes, elements) = ((*scene).nodes as usize, (*scene).elements as usize);
-        (*scene).facts = facts;
+        copy_apart(from_mut(&mut (*scene).facts), &changed);
         let mut arrays = Arrays::behind(scene.cast_const());
         arrays.read::<NodeInertia>(nodes);
         arrays.read::<ElementTile>(tiles_for(elements));
-        copy(arrays.change(tissues.len()), tissues);
+        copy_apart(arrays.change(tissues.len()), tissues);
         Ok(())
     }
 }
