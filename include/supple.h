@@ -998,8 +998,8 @@ typedef struct {
      */
     float stiffness;
     /**
-     * The most force, N, infinite for no limit; zero: half the shear modulus of the tissue on the cross-sections of the nodes' own
-     * tissue. More tears the tissue.
+     * The most force, N, infinite for no limit; zero: three quarters of the shear modulus on a face of the cube of its
+     * nodes' volume. More tears the tissue.
      */
     float most;
     /**

@@ -23,8 +23,8 @@ pub struct supple_pull {
     pub radius: f32,
     /// N/m, from 0, absent, to 1e6.
     pub stiffness: f32,
-    /// The most force, N, infinite for no limit; zero: half the shear modulus of the tissue on the cross-sections of the nodes' own
-    /// tissue. More tears the tissue.
+    /// The most force, N, infinite for no limit; zero: three quarters of the shear modulus on a face of the cube of its
+    /// nodes' volume. More tears the tissue.
     pub most: f32,
     /// The direction along which it pulls, of any length, as the normal of a surface on which the point slides; zeros: along all.
     pub along: [f32; 3],
@@ -180,10 +180,12 @@ pub unsafe extern "C" fn supple_add_pull(
         let points = array(points.cast::<[f32; 3]>(), object.scene_nodes as usize)?;
         let parts = object.parts(arrays);
         let room = parts.nodes.get_mut(first..).unwrap_or_default();
-        let count = patch(points, given.at, given.radius, room).map_err(|error| match error {
-            PullError::Capacity { needed, .. } => room_for(first + needed, object.node_room),
-            other => refused(object.pulls as usize, other),
-        })?;
+        let count = patch(points, |node| open.view().node_mass(node), given.at, given.radius, room).map_err(
+            |error| match error {
+                PullError::Capacity { needed, .. } => room_for(first + needed, object.node_room),
+                other => refused(object.pulls as usize, other),
+            },
+        )?;
         added(object, &open, parts, given, count)
     };
     // SAFETY: as above.

@@ -170,7 +170,8 @@ impl<'w> Simulation<'w> {
         } else {
             let nodes = self.points.len();
             self.pulled.resize(first + nodes, PulledNode::default());
-            let count = patch(&self.points, point, radius, &mut self.pulled[first..]);
+            let scene = self.scene.view();
+            let count = patch(&self.points, |node| scene.node_mass(node), point, radius, &mut self.pulled[first..]);
             self.pulled.truncate(first + *count.as_ref().unwrap_or(&0));
             count?;
         }

@@ -1088,6 +1088,8 @@ static void pulls(void) {
     note(SUPPLE_E_NO_PULLS);
     DONE(supple_set_pulls(acts, NULL));
     DONE(supple_state_reset(state));
+}
+
 static void images(void) {
     static supple_followed_point located[2];
     static float places[2][3] = {{0.01f, 0.01f, 0.01f}, {0.01f, 0.01f, -0.01f}}, moved[2][3], field[3 * 27];

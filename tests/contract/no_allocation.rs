@@ -174,7 +174,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 
     // A pull draws its middle aside.
     let mut nodes = [PulledNode::default(); NODES];
-    let count = patch(&points, [0.01, 0.01, 0.02], 0.011, &mut nodes).unwrap() as u32;
+    let count = patch(&points, |_| 1.0, [0.01, 0.01, 0.02], 0.011, &mut nodes).unwrap() as u32;
     let mut pulls = [Pull::new([0, count], [0.01, 0.01, 0.02], 100.0)];
     pulls[0].put([0.015, 0.01, 0.02]);
     let mut pull_forces = [NodeVector::ZERO];

@@ -29,14 +29,17 @@ fn what_cannot_be_is_refused_in_words() {
     assert_eq!(told.to_string(), "entry 0 of the pulled nodes: node 3 does not exist, the scene has 3 nodes");
     let points: Vec<_> = BAR.points().collect();
     let mut room = [PulledNode::default(); 5];
-    let told = patch(&points, [1.0, 0.015, 0.06], 0.01, &mut room).unwrap_err();
+    let told = patch(&points, |_| 1.0, [1.0, 0.015, 0.06], 0.01, &mut room).unwrap_err();
     assert_eq!(
         told.to_string(),
         "a pull of radius 10.000 mm: the nearest node is 970.000 mm away, a larger radius reaches it"
     );
-    assert!(matches!(patch(&points, [0.015; 3], 0.02, &mut room), Err(PullError::Capacity { capacity: 5, .. })));
+    assert!(matches!(
+        patch(&points, |_| 1.0, [0.015; 3], 0.02, &mut room),
+        Err(PullError::Capacity { capacity: 5, .. })
+    ));
     for radius in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(patch(&points, [0.015; 3], radius, &mut room).is_err());
+        assert!(patch(&points, |_| 1.0, [0.015; 3], radius, &mut room).is_err());
     }
 }
 

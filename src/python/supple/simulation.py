@@ -377,7 +377,7 @@ class Simulation:
         """Draws points of the tissue (m, at rest) to targets (m) from now on, each by the nodes within `radius` (m; 2.2 mean edges unless
         given, some 24 nodes), with `stiffness` (N/m, one
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
-        (half the shear modulus on the cross-sections of the nodes' own tissue unless given; more tears the tissue). With `along`, a direction for all or for
+        (three quarters of the shear modulus on a face of the cube of its nodes' volume unless given; more tears the tissue). With `along`, a direction for all or for
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent."""
         radius = _PATCH * self.scene._edge if radius is None else radius
         wanted = wanted_of(points, radius, stiffness, most, along)

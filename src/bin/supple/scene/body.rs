@@ -90,6 +90,15 @@ impl Body {
         areas
     }
 
+    /// Of the tissue of each node, a quarter of its elements, m^3.
+    pub(crate) fn node_volumes(&self) -> Vec<f32> {
+        let mut volumes = vec![0.0; self.local.len()];
+        for (tet, volume) in self.mesh.tets.iter().zip(self.volumes()) {
+            tet.iter().for_each(|&node| volumes[node as usize] += (0.25 * volume) as f32);
+        }
+        volumes
+    }
+
     /// Triangles that belong to one element only.
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
         boundary(self.mesh.tets.iter().copied())

@@ -76,7 +76,8 @@ impl ScenePulls {
         match positive(file, "radius", table.radius.as_ref(), f32::MIN_POSITIVE)? {
             Some(radius) => {
                 self.nodes.resize(first + body.local.len(), PulledNode::default());
-                let count = patch(&body.local, point, radius, &mut self.nodes[first..]);
+                let volumes = body.node_volumes();
+                let count = patch(&body.local, |node| volumes[node], point, radius, &mut self.nodes[first..]);
                 self.nodes.truncate(first + *count.as_ref().unwrap_or(&0));
                 count.map_err(|error| file.problem(&table.point, error))?;
             }
