@@ -222,7 +222,7 @@ impl ImageGrid {
 }
 
 /// Numbers of scratch that [`displacement_field`] needs for a grid and a reach (m; 0: none): half a number for each point
-/// where spacings are alike, some three at most, and two more for each where the reach is below eight spacings.
+/// where spacings are alike, some four at most, and two more for each where the reach is below eight spacings.
 pub fn scratch_for(grid: &ImageGrid, reach: f32) -> Result<usize, FieldError> {
     grid.check()?;
     check_reach(reach)?;

@@ -195,7 +195,7 @@ proptest! {
         let grid = ImageGrid::aligned([0.0, 0.0, 0.01], spacing, size);
         let words = scratch_for(&grid, reach).unwrap();
         let points = grid.point_count() as usize;
-        prop_assert!(words <= 5 * points + 4 * size[0] as usize + 300, "{words} for {points}");
+        prop_assert!(words <= 6 * points + 4 * size[0] as usize + 300, "{words} for {points}");
         let mut number = bits;
         let mut random = || {
             number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

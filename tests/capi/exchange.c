@@ -47,7 +47,7 @@ static void set_gravity(supple_sim *sim) {
     CHECK(supple_set_gravity(objects_of(sim).loads, gravity) == SUPPLE_OK);
 }
 
-/* The largest distance of two bodies' nodes over the largest displacement. */
+/* The largest difference of two bodies' displacements along an axis, over the largest displacement along one. */
 static double difference(supple_sim *one, supple_sim *other, int with_alone) {
     CHECK(supple_copy_displacements(objects_of(one).state, of_one[0], 3 * NODES) == SUPPLE_OK);
     CHECK(supple_copy_displacements(objects_of(other).state, of_other[0], 3 * NODES) == SUPPLE_OK);
@@ -55,7 +55,8 @@ static double difference(supple_sim *one, supple_sim *other, int with_alone) {
     for (int n = 0; n < NODES; n++) {
         double off = 0.0, way = 0.0;
         for (int axis = 0; axis < 3; axis++) {
-            off += pow((double)of_one[n][axis] - (double)of_other[n][axis], 2), way += pow((double)of_other[n][axis], 2);
+            const double is = fabs((double)of_one[n][axis] - (double)of_other[n][axis]), at = fabs((double)of_other[n][axis]);
+            off = is > off ? is : off, way = at > way ? at : way;
         }
         int is_left = 0;
         for (int e = 0; e < TETS && !is_left; e++) {
@@ -63,7 +64,7 @@ static double difference(supple_sim *one, supple_sim *other, int with_alone) {
         }
         if (is_left || with_alone) most = off > most ? off : most, far = way > far ? way : far;
     }
-    return sqrt(most / far);
+    return most / far;
 }
 
 /* The half of the bar beyond a height, on one side. */
