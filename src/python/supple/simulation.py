@@ -479,8 +479,8 @@ class Simulation:
             place = f"{_PLACES[remark.kind]} {remark.index}: " if remark.kind in _PLACES else ""
             words = str(ffi.string(lib.supple_remark_text(remark.kind)), "ascii")
             said.append(f"{place}{words} ({' against '.join(figures) or 'no figure'})")
-        if not len(self.scene._supports):
-            said.append("no node is fixed or moved: the body is free")
+        if not len(self.scene._supports) and not self._pull_groups:
+            said.append("no node is fixed, moved or pulled: the body is free")
         return said
 
     def _warn_once(self) -> None:
