@@ -1025,8 +1025,8 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_SHORT, supple_pulls_init(memory, bytes - 1, scene, MOST, ROOM, &made));
     DONE(supple_pulls_init(memory, bytes, scene, MOST, ROOM, &made));
 
-    /* The middle of the far end, from an element's own corners or from a patch. */
-    supple_pull pull = {{0.005f * X, 0.005f * Y, 0.01f * Z}, 0.012f, 200.0f, INFINITY, {0, 0, 0}};
+    /* The middle of the held far end with nodes below it, or a corner. */
+    supple_pull pull = {{0.005f * X, 0.005f * Y, 0.01f * Z}, 0.013f, 200.0f, INFINITY, {0, 0, 0}};
     supple_pull wrong = pull;
     wrong.radius = 1e-6f, wrong.at[2] += 0.5f;
     REFUSED(SUPPLE_E_NO_NODES, supple_add_pull(made, scene, points[0], &wrong, &error));
