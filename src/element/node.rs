@@ -1,7 +1,7 @@
 //! The mass of a node (kg) and its held axes.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec4;
+use glam::{BVec4A, Vec4};
 
 use crate::padding;
 
@@ -60,11 +60,17 @@ impl NodeInertia {
     /// A node without mass.
     pub const EMPTY: Self = Self { inverse: [0.0; 3], mass: 0.0 };
 
-    /// Ones along free axes; the fourth number is zero.
+    /// The axes along which it moves; not the fourth one.
+    #[inline(always)]
+    pub(crate) fn free_axes(&self) -> BVec4A {
+        let [x, y, z] = self.inverse;
+        Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO)
+    }
+
+    /// Ones along these.
     #[inline(always)]
     pub(crate) fn free(&self) -> Vec4 {
-        let [x, y, z] = self.inverse;
-        Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
+        Vec4::select(self.free_axes(), Vec4::ONE, Vec4::ZERO)
     }
 
     /// How many axes are held.

@@ -9,7 +9,7 @@ use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{
-    CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, write_volumes,
+    CallingThread, Computed, Moving, Status, Step, StepMethod, Threads, TotalForces, Totals, Trial, write_volumes,
 };
 
 use super::cells::{prolong, restrict};
@@ -115,20 +115,10 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
-        let Trial { scene, loads, displacement, remainder, is_heated, force, volume, progress, .. } = &mut *trial;
-        let forcing = Forcing {
-            scene: *scene,
-            visitor: ScalarBound,
-            displacement,
-            remainder,
-            is_heated: *is_heated,
-            loads,
-            progress,
-            look_cycle: LOOK_CYCLE_OF_LONG,
-        };
+        let TotalForces { forcing, volume, force, .. } = trial.forcing(ScalarBound, LOOK_CYCLE_OF_LONG);
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         let frames = &mut self.storage.matrices.frames;
-        self.model.renewal.update_frames(frames, displacement, progress.steps);
+        self.model.renewal.update_frames(frames, trial.displacement, trial.progress.steps);
         trial.add_pushes_before(self.step);
         pulls::add_pulls(trial, self.step, &self.storage.tables, self.storage.places);
         let moved = self.move_lattice(trial);

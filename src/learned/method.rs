@@ -10,7 +10,7 @@ use super::{LearnedReport, Vertex};
 use crate::element::{ElementMaterial, NoVisitor, NodeInertia};
 use crate::mlp::Network;
 use crate::simd::NodeVector;
-use crate::step::{Computed, Forcing, Moving, Step, StepMethod, Threads, Totals, Trial, move_in_parts, moved};
+use crate::step::{Computed, Moving, Step, StepMethod, Threads, TotalForces, Totals, Trial, move_in_parts, moved};
 
 /// A learned step that is being computed.
 pub(super) struct Learned<'a, 'w, T> {
@@ -23,18 +23,9 @@ pub(super) struct Learned<'a, 'w, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = trial;
-        let (network, step, inertia) = (self.network, self.step, scene.inertia);
-        let forcing = Forcing {
-            scene: *scene,
-            visitor: NoVisitor,
-            displacement,
-            remainder,
-            is_heated: *is_heated,
-            loads,
-            progress,
-            look_cycle: 1,
-        };
+        let (network, step, inertia) = (self.network, self.step, trial.scene.inertia);
+        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, 1);
+        let displacement = forcing.displacement;
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let displacement = displacement.get(nodes.clone()).unwrap_or_default();

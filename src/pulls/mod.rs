@@ -13,11 +13,12 @@
 //! ```text
 //! p = k (y - z) / (1 + k c),   c = s sum w^2 / m,   s the step's factor of force over mass     (backward Euler)
 //! ```
-//! and again, at most three times, where pulls share nodes. //! Long steps take it half a step ahead of their start, at the velocity of the point, and raise inertia by twice the
-//! stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]); none is stiffer there than its most force over
-//! half a millimetre. Both are the exact pull where nothing
-//! moves. In an exact step no pull moves its point by more than a fiftieth of the size of the tissue at its nodes, so that tissue is not torn
-//! before it can answer. Learned steps refuse pulls.
+//! and again, at most three times, where pulls share nodes. No pull moves its point by more than a fiftieth of the size
+//! of the tissue at its nodes in such a step, so that tissue is not torn before it can answer.
+//!
+//! Long steps take the force half a step ahead of their start, at the velocity of the point, and raise inertia by twice
+//! the stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]); none is stiffer there than its most
+//! force over half a millimetre. Both are the exact pull where nothing moves. Learned steps refuse pulls.
 //!
 //! Steps keep nothing of pulls but their forces, for the host to read ([`Pulls::read`]).
 

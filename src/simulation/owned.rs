@@ -69,6 +69,16 @@ pub(super) enum Prepared<'w> {
     Learned(Box<LearnedStep<'w, Vec<NodeVector>>>, Exact, Lead, Option<Box<Guard<Vec<NodeVector>>>>),
 }
 
+/// See [`Simulation::acting`].
+pub(super) struct Acting<'a, 'w> {
+    pub(super) loads: LoadsOfCall<'a>,
+    pub(super) scene: &'a VecScene<VecMaterial>,
+    pub(super) state: &'a mut VecState,
+    /// None before the steps are prepared.
+    prepared: &'a mut Option<Prepared<'w>>,
+    clock: &'a mut Clock,
+}
+
 #[derive(Debug)]
 pub(super) enum Exact {
     Fixed(Step),
@@ -203,18 +213,12 @@ impl<'w> Simulation<'w> {
         }
         self.ablate_on()?;
         self.prepare_once()?;
-        let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, settings, .. } = self;
-        let (touchable, in_step, clock) = (&self.touchable, &mut self.in_step, &mut self.clock);
-        let others = (&*pressures, &**instruments, touchable, (&**pulled, &**pulls));
-        let loads = checked_loads(scene, *gravity, (forces, motions), others)?;
-        state.make_room_for_pulls(pulls.len());
-        in_step.resize(motions.len(), Motion::default());
-        let mut loads = LoadsOfCall::new(loads, in_step);
+        let work = self.settings.work();
+        let Acting { mut loads, scene, state, prepared, clock } = self.acting()?;
         let end = clock.end_of_call(state.time(), seconds);
         // Not reached: prepared above; there is no panic in its place.
-        let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
+        let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
-        let work = settings.work();
         let report = mover.advance(end, scene.view(), &mut loads, state.view(), work, threads, &mut |_| {})?;
         clock.ended(state.time(), report.status);
         match report.status {
@@ -243,17 +247,21 @@ impl<'w> Simulation<'w> {
         Ok(mover.advance(until, scene.view(), &mut loads, state.view(), work, &CallingThread, watch)?)
     }
 
-    /// The loads of a call, and what they act on.
-    pub(super) fn acting(
-        &mut self,
-    ) -> Result<(LoadsOfCall<'_>, &VecScene<VecMaterial>, &mut VecState), SimulationError> {
-        let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, touchable, .. } =
-            self;
-        let (others, in_step) = ((&*pressures, &**instruments, &*touchable, (&**pulled, &**pulls)), &mut self.in_step);
-        let loads = checked_loads(scene, *gravity, (forces, motions), others)?;
+    /// What takes part in a call under its own loads, checked.
+    pub(super) fn acting(&mut self) -> Result<Acting<'_, 'w>, SimulationError> {
+        let Self { gravity, forces, motions, pressures, instruments, pulls, pulled, scene, state, in_step, .. } = self;
+        let (nodes, touchable) = (scene.node_count(), &self.touchable);
+        let mut loads = pressures.on(scene, Loads::new(scene, *gravity, forces, motions)?)?;
+        if !instruments.is_empty() {
+            loads = loads.touched_by(Contact::new(surface(touchable, nodes)?, instruments)?);
+        }
+        if !pulls.is_empty() {
+            loads = loads.pulled_by(Pulls::new(nodes, pulled, pulls)?);
+        }
         state.make_room_for_pulls(pulls.len());
         in_step.resize(motions.len(), Motion::default());
-        Ok((LoadsOfCall::new(loads, in_step), scene, state))
+        let loads = LoadsOfCall::new(loads, in_step);
+        Ok(Acting { loads, scene, state, prepared: &mut self.prepared, clock: &mut self.clock })
     }
 
     /// The next call prepares the steps anew, from the state as it is.
@@ -416,26 +424,6 @@ impl<'w> Prepared<'w> {
             }
         }
     }
-}
-
-/// Pressures, instruments with what they touch, pulls with their nodes.
-type Others<'a> = (&'a VecPressure, &'a [Instrument<'a>], &'a Touchable, (&'a [PulledNode], &'a [Pull]));
-
-fn checked_loads<'a>(
-    scene: &VecScene<VecMaterial>,
-    gravity: [f32; 3],
-    (forces, motions): (&'a [NodalForce], &'a [Motion]),
-    (pressures, instruments, touchable, (pulled, pulls)): Others<'a>,
-) -> Result<Loads<'a>, SimulationError> {
-    let nodes = scene.node_count();
-    let mut loads = pressures.on(scene, Loads::new(scene, gravity, forces, motions)?)?;
-    if !instruments.is_empty() {
-        loads = loads.touched_by(Contact::new(surface(touchable, nodes)?, instruments)?);
-    }
-    if !pulls.is_empty() {
-        loads = loads.pulled_by(Pulls::new(nodes, pulled, pulls)?);
-    }
-    Ok(loads)
 }
 
 fn surface<'a>((nodes, triangles): &'a Touchable, scene_nodes: usize) -> Result<Surface<'a>, ContactError> {

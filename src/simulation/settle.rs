@@ -2,6 +2,7 @@
 
 use std::vec;
 
+use super::owned::Acting;
 use super::{Simulation, SimulationError};
 use crate::loads::LoadsOverTime;
 use crate::simd::NodeVector;
@@ -24,7 +25,7 @@ impl Simulation<'_> {
         most_steps: u32,
         threads: &impl Threads,
     ) -> Result<Settled, SimulationError> {
-        let (mut loads, scene, state) = self.acting()?;
+        let Acting { mut loads, scene, state, .. } = self.acting()?;
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
         let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, most_steps, &mut room, threads)?;
         match settled.status {

@@ -16,6 +16,7 @@ use crate::scene::SceneView;
 use crate::simd::{NodeVector, Scatter};
 use crate::state::Progress;
 
+use super::Trial;
 use super::threads::{Threads, take};
 
 /// The input of the total forces.
@@ -32,6 +33,24 @@ pub(crate) struct Forcing<'a, M, V> {
     pub(crate) progress: &'a Progress,
     /// Steps of this kind in which every element is looked at where some may be crushed ([`crate::element`]).
     pub(crate) look_cycle: usize,
+}
+
+impl<M> Trial<'_, M> {
+    /// The input of the total forces, the latest increments, and where to write volumes and forces.
+    pub(crate) fn forcing<V>(&mut self, visitor: V, look_cycle: usize) -> TotalForces<'_, M, V> {
+        let Self { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = self;
+        let (scene, is_heated) = (*scene, *is_heated);
+        let forcing = Forcing { scene, visitor, displacement, remainder, is_heated, loads, progress, look_cycle };
+        TotalForces { forcing, increment, volume, force }
+    }
+}
+
+/// See [`Trial::forcing`].
+pub(crate) struct TotalForces<'a, M, V> {
+    pub(crate) forcing: Forcing<'a, M, V>,
+    pub(crate) increment: &'a [NodeVector],
+    pub(crate) volume: &'a mut [NodeVector],
+    pub(crate) force: &'a mut [NodeVector],
 }
 
 /// The partitions of one thread, with their share of the arrays.

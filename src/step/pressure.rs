@@ -22,7 +22,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let Self { scene, loads, displacement, increment, force, progress, .. } = self;
         let (Some(pressure), time) = (loads.pressure(), progress.time) else { return };
         let (mut work, mut torn) = (0.0, None);
-        let density = scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density);
+        let density = scene.density();
         // What the forces of the triangles around a node, each as large as one of them, move it by for each kilogram.
         let push = AROUND * step.seconds() * step.seconds() / (1.0 + method.added_inertia());
         pressure.each(
@@ -38,8 +38,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                         continue;
                     };
                     let next = Vec4::from(method.next_increment(node, inertia, increment, force));
-                    let [x, y, z] = inertia.inverse;
-                    let free = Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO);
+                    let free = inertia.free_axes();
                     let last = Vec4::from(increment.0);
                     way += Vec4::select(free, 0.5 * (next + last), last);
                     // What is held does not tear.

@@ -33,7 +33,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let end = self.progress.time + f64::from(step.seconds());
         self.pulls.fill(NodeVector::ZERO);
-        let (mut sweep, density) = (0, self.scene.density());
+        let mut sweep = 0;
         loop {
             let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
             for (index, pull) in pulls.acting() {
@@ -41,10 +41,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 let point = self.pulled_point(pulls, pull, (step, method));
                 let gap = (pull.target(end) - Vec3::from_array(pull.at)) - (point.here + point.next);
                 let change = pull.force(gap, now, point.compliance) - now;
-                let volume = pulls
-                    .nodes_of(pull)
-                    .first()
-                    .map_or(0.0, |pulled| self.scene.node_mass(pulled.node as usize) / density);
+                let first = pulls.nodes_of(pull).first();
+                let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
                 let change = point.without_tearing(change, most_way * most_way * most_way * volume);
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);

@@ -46,8 +46,8 @@ use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::pulls::MOST_WAY;
 use crate::step::{
-    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Moving, Status, Step, StepMethod, Threads, Totals,
-    Trial, move_in_parts, nodal_volumes, write_volumes,
+    self, CallingThread, Cause, Computed, EnergyBalance, Moving, Status, Step, StepMethod, Threads, TotalForces,
+    Totals, Trial, move_in_parts, nodal_volumes, write_volumes,
 };
 use central_differences::{Advance, EnergyInput, next_increment};
 
@@ -80,20 +80,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } =
-            &mut *trial;
-        let (inertia, step) = (scene.inertia, self.step);
-        let forcing = Forcing {
-            scene: *scene,
-            visitor: NoVisitor,
-            displacement,
-            remainder,
-            is_heated: *is_heated,
-            loads,
-            progress,
-            look_cycle: LOOK_CYCLE,
-        };
+        let (inertia, step, loads) = (trial.scene.inertia, self.step, trial.loads);
         let (instruments, is_pulled) = (loads.contact().is_some(), loads.pulls().is_some());
+        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, LOOK_CYCLE);
         let total = |nodes: Range<usize>, increment: &[NodeVector], force: &[NodeVector]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();

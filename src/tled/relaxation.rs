@@ -2,13 +2,15 @@
 
 use core::ops::Range;
 
-use glam::{BVec4A, Vec4};
+use glam::Vec4;
 
 use crate::element::{ElementMaterial, LOOK_CYCLE, NoVisitor, NodeInertia};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{Cause, Computed, Forcing, Moving, Step, StepMethod, Threads, Totals, Trial, move_in_parts, moved};
+use crate::step::{
+    Cause, Computed, Moving, Step, StepMethod, Threads, TotalForces, Totals, Trial, move_in_parts, moved,
+};
 
 /// As that of exact steps ([`crate::step::pulls`]); here no inertia carries on what a pull has begun.
 const MOST_WAY: f32 = 0.1;
@@ -26,7 +28,7 @@ pub(super) fn go_back<M: ElementMaterial>(
         let (here, rest) = (Vec4::from(at.0), Vec4::from(left.0));
         let increment = Vec4::from(last.0);
         let before = increment - node.push / rate * Vec4::from(force.0);
-        let back = Vec4::select(free_axes(inertia), increment + 0.5 * before, Vec4::ZERO);
+        let back = Vec4::select(inertia.free_axes(), increment + 0.5 * before, Vec4::ZERO);
         [at.0, left.0] = moved(here, rest, -back).map(|vector| vector.to_array());
         last.0 = [0.0; 4];
     }
@@ -45,15 +47,8 @@ impl NodeMotion {
     #[inline(always)]
     fn next(self, inertia: &NodeInertia, rate: f32, increment: &NodeVector, force: &NodeVector) -> Vec4 {
         let next = Vec4::from(increment.0) + self.push / rate * Vec4::from(force.0);
-        Vec4::select(free_axes(inertia), next, Vec4::ZERO)
+        Vec4::select(inertia.free_axes(), next, Vec4::ZERO)
     }
-}
-
-/// The axes along which a node moves.
-#[inline(always)]
-fn free_axes(inertia: &NodeInertia) -> BVec4A {
-    let [x, y, z] = inertia.inverse;
-    Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO)
 }
 
 /// One step.
@@ -88,7 +83,7 @@ impl<T> Relaxation<'_, T> {
         let mut kinetic = 0.0;
         for ((inertia, rate), (increment, force)) in nodes {
             let next = self.node.next(inertia, *rate, increment, force);
-            let (increment, force, free) = (Vec4::from(increment.0), Vec4::from(force.0), free_axes(inertia));
+            let (increment, force, free) = (Vec4::from(increment.0), Vec4::from(force.0), inertia.free_axes());
             // A held axis has no inertia of its own: what moves it is counted as work.
             let mean = 0.5 * (next + Vec4::select(free, increment, Vec4::ZERO));
             let prescribed = Vec4::select(free, Vec4::ZERO, increment);
@@ -108,19 +103,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } =
-            &mut *trial;
-        let (inertia, scene) = (scene.inertia, *scene);
-        let forcing = Forcing {
-            scene,
-            visitor: NoVisitor,
-            displacement,
-            remainder,
-            is_heated: *is_heated,
-            loads,
-            progress,
-            look_cycle: LOOK_CYCLE,
-        };
+        let inertia = trial.scene.inertia;
+        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, LOOK_CYCLE);
         let own = Relaxation { step: self.step, node: self.node, rates: self.rates, threads: &(), is_fine: false };
         let sums_of = |nodes, force: &[NodeVector], _: &mut [()]| own.sums(nodes, inertia, increment, force);
         let (sums, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, sums_of);

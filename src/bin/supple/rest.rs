@@ -6,10 +6,10 @@
 //! ([`Simulation::settle`]) takes more steps on slender bodies for distances of micrometres, which derivatives need. Units: m, s.
 
 use supple::simulation::{Event, Method, Settings, Simulation};
-use supple::state::VecState;
 use supple::step::{Divergence, Status};
 
 use crate::problem::Problem;
+use crate::report::simulation::shape;
 use crate::scene::setup::Setup;
 
 /// Steps between two looks at the kinetic energy.
@@ -160,11 +160,6 @@ impl<'a> Resting<'a> {
     }
 
     fn displacements(&self) -> Vec<[f32; 3]> {
-        displacements(self.simulation.state())
+        shape(self.simulation.state())
     }
-}
-
-/// Displacement (m) of each node.
-pub(crate) fn displacements(state: &VecState) -> Vec<[f32; 3]> {
-    state.displacements().iter().map(|vector| vector.to_array()).collect()
 }

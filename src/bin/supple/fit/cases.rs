@@ -9,7 +9,8 @@ use super::measured::{self, Sample};
 use super::place::{Edit, edited};
 use super::points::Followed;
 use crate::problem::Problem;
-use crate::rest::{Unrest, at_rest, displacements};
+use crate::report::simulation::shape;
+use crate::rest::{Unrest, at_rest};
 use crate::run::start::Start;
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
@@ -184,7 +185,7 @@ impl Case {
             if let supple::step::Status::Diverged(divergence) = report.status {
                 return Err(Problem(format!("{}: the simulation {divergence}", self.name)));
             }
-            found[index] = self.points[index].displacement(&displacements(simulation.state()));
+            found[index] = self.points[index].displacement(&shape(simulation.state()));
         }
         Ok(found)
     }

@@ -54,7 +54,7 @@ impl Folder {
         let body = &setup.body;
         let pressure = tled::nodal_pressures(&scene, state)
             .ok_or_else(|| Problem("the state does not have the nodes of the scene".into()))?;
-        let displacement: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
+        let displacement = report::simulation::shape(state);
         let velocity: Vec<_> = (0..displacement.len()).map(|node| state.velocity(node)).collect();
         // Elements that were left out have four fixed nodes: no stress, no change of volume.
         let mut von_mises = vec![0.0; body.mesh.tets.len()];

@@ -20,6 +20,10 @@ pub struct Body {
     pub(crate) name: String,
 }
 
+fn relative(point: [f64; 3], centre: [f64; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|axis| (point[axis] - centre[axis]) as f32)
+}
+
 impl Body {
     pub(crate) fn read(path: &Path, scale: f64, winding: Winding) -> Result<Self, Problem> {
         let mut mesh = io::read_mesh(path).map_err(Problem::of)?;
@@ -32,9 +36,19 @@ impl Body {
     pub(crate) fn new(mesh: TetMesh, winding: Winding, name: String) -> Self {
         let (low, high) = extent(&mesh.points);
         let centre = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
-        let local = mesh.points.iter().map(|point| [0, 1, 2].map(|axis| (point[axis] - centre[axis]) as f32));
-        let local = local.collect();
+        let local = mesh.points.iter().map(|&point| relative(point, centre)).collect();
         Self { mesh, local, centre, winding, name }
+    }
+
+    /// The same body with its nodes elsewhere (m), about the same centre.
+    pub(crate) fn move_to(&mut self, points: &[[f64; 3]]) {
+        self.mesh.points = points.to_vec();
+        self.local = points.iter().map(|&point| self.local_point(point)).collect();
+    }
+
+    /// Coordinates less the centre, m.
+    pub(crate) fn local_point(&self, point: [f64; 3]) -> [f32; 3] {
+        relative(point, self.centre)
     }
 
     fn bar(bar: Bar) -> Self {

@@ -65,8 +65,7 @@ pub struct SceneInstruments {
 impl SceneInstruments {
     /// A ball on a path (s, and m in the body's coordinates), for the demo.
     pub(crate) fn ball(body: &Body, radius: f32, friction: f32, path: &[(f64, [f64; 3])]) -> Self {
-        let local = |at: [f64; 3]| [0, 1, 2].map(|axis| (at[axis] - body.centre[axis]) as f32);
-        let path = path.iter().map(|&(time, at)| (time, local(at))).collect();
+        let path = path.iter().map(|&(time, at)| (time, body.local_point(at))).collect();
         let instrument =
             MovedInstrument { shape: OwnedShape::Sphere { radius }, friction, path, direction: [0.0, 0.0, 1.0] };
         Self::new(vec![instrument], body)
@@ -285,7 +284,6 @@ pub(super) fn checked_path(
     path: &Spanned<Vec<[f64; 4]>>,
     body: &Body,
 ) -> Result<Vec<(f64, [f32; 3])>, Problem> {
-    let local = |point: [f64; 3]| [0, 1, 2].map(|axis| (point[axis] - body.centre[axis]) as f32);
     let points = path.get_ref();
     if points.is_empty() {
         return Err(file.problem(path, "the path has no point"));
@@ -296,7 +294,7 @@ pub(super) fn checked_path(
     if let Some((a, b)) = points.iter().zip(&points[1..]).find(|(a, b)| a[0] >= b[0]) {
         return Err(file.problem(path, format!("the path goes from {} s to {} s; times must increase", a[0], b[0])));
     }
-    Ok(points.iter().map(|&[time, x, y, z]| (time, local([x, y, z]))).collect())
+    Ok(points.iter().map(|&[time, x, y, z]| (time, body.local_point([x, y, z]))).collect())
 }
 
 /// A number that is finite and not below `least`.

@@ -48,7 +48,7 @@ impl ScenePoints {
                 return Err(file.problem(place, format!("at holds {component}")));
             }
             names.push(text.clone());
-            places.push([0, 1, 2].map(|axis| (place.get_ref()[axis] - body.centre[axis]) as f32));
+            places.push(body.local_point(*place.get_ref()));
         }
         let followed = VecPoints::locate(&body.checked()?, &places).map_err(Problem::of)?;
         Ok(Self { names, followed: Some(followed) })

@@ -53,8 +53,9 @@ impl ScenePulls {
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
         let scene = &file.scene;
         let mut pulls = Self::default();
+        let volumes = if scene.pull.is_empty() { vec![] } else { body.node_volumes() };
         for at in &scene.pull {
-            pulls.add(file, at, body)?;
+            pulls.add(file, at, body, &volumes)?;
         }
         pulls.pulls = pulls.all.len();
         for at in &scene.spring {
@@ -68,15 +69,14 @@ impl ScenePulls {
         Ok(pulls)
     }
 
-    fn add(&mut self, file: &SceneFile, at: &Spanned<PullTable>, body: &Body) -> Result<(), Problem> {
+    /// `volumes` are those of the tissue of the nodes, m^3.
+    fn add(&mut self, file: &SceneFile, at: &Spanned<PullTable>, body: &Body, volumes: &[f32]) -> Result<(), Problem> {
         let table = at.get_ref();
-        let local = |point: [f64; 3]| [0, 1, 2].map(|axis| (point[axis] - body.centre[axis]) as f32);
-        let point = local(*table.point.get_ref());
+        let point = body.local_point(*table.point.get_ref());
         let first = self.nodes.len();
         match positive(file, "radius", table.radius.as_ref(), f32::MIN_POSITIVE)? {
             Some(radius) => {
                 self.nodes.resize(first + body.local.len(), PulledNode::default());
-                let volumes = body.node_volumes();
                 let count = patch(&body.local, |node| volumes[node], point, radius, &mut self.nodes[first..]);
                 self.nodes.truncate(first + *count.as_ref().unwrap_or(&0));
                 count.map_err(|error| file.problem(&table.point, error))?;

@@ -16,7 +16,7 @@ use supple::io::{Frame, TetMesh};
 
 use crate::problem::{End, Problem};
 use crate::rest::{Unrest, at_rest};
-use crate::scene::body::{Body, volume};
+use crate::scene::body::volume;
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
 use crate::screen::{message, row};
@@ -241,13 +241,4 @@ fn mean(values: &[f64]) -> f64 {
 
 fn most(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
-}
-
-impl Body {
-    /// The same body with its nodes elsewhere (m), about the same centre.
-    fn move_to(&mut self, points: &[[f64; 3]]) {
-        self.mesh.points = points.to_vec();
-        let centre = self.centre;
-        self.local = points.iter().map(|point| [0, 1, 2].map(|axis| (point[axis] - centre[axis]) as f32)).collect();
-    }
 }
