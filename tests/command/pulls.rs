@@ -54,6 +54,8 @@ fn points_follow_the_tissue() {
     let height = |row: usize| rows[row][4].parse::<f64>().unwrap();
     // The middle goes half the way, the end all of it.
     assert!((height(5) - 0.0275).abs() < 2e-4 && (height(6) - 0.057).abs() < 1e-6);
+    let report = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    assert!(report.contains("Followed points") && report.contains("\"middle\"") && !report.contains("Gaps of pulls"));
 }
 
 #[test]

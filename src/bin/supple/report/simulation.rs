@@ -15,6 +15,7 @@ pub(crate) fn part(setup: &Setup, state: &VecState, outcome: &Outcome, conclusio
     let mut sections = vec![result(setup, outcome, conclusion), shapes(setup, state), motion(outcome)];
     sections.extend(forces(outcome));
     sections.extend(gaps(outcome));
+    sections.extend(followed(outcome));
     ReportPart { made: Made::by_this_command("none"), sections }
 }
 
@@ -102,40 +103,50 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
     }
 }
 
-fn gaps(outcome: &Outcome) -> Option<Section> {
-    let gaps = outcome.pulls.gaps();
-    if gaps.is_empty() {
-        return None;
+/// A curve over time for each name, those that reach farthest if there are many; none if there are no names.
+fn over_time(title: &str, unit: &str, caption: &str, mut curves: Vec<(String, Vec<(f64, f64)>)>) -> Option<Section> {
+    const MOST: usize = 12;
+    let most = |rows: &[(f64, f64)]| rows.iter().map(|row| row.1).fold(0.0, f64::max);
+    let all = curves.len();
+    if all > MOST {
+        curves.sort_by(|a, b| most(&b.1).total_cmp(&most(&a.1)));
+        curves.truncate(MOST);
     }
-    let curves = gaps.into_iter().enumerate().map(|(index, rows)| {
-        let (times, metres): (_, Vec<_>) = rows.into_iter().unzip();
-        let millimetres = metres.into_iter().map(|metre| 1e3 * metre).collect();
-        Curve::new(format!("pull {index}"), times, millimetres).coloured(COLOURS[index % COLOURS.len()])
+    let drawn = curves.into_iter().enumerate().map(|(index, (name, rows))| {
+        let (times, values) = rows.into_iter().unzip();
+        Curve::new(name, times, values).coloured(COLOURS[index % COLOURS.len()])
     });
-    let plot = plots::linear("time, s", "gap, mm", curves.collect());
-    let caption =
-        "Distance of each pulled point from its target at the frames; points, gaps and forces are in pulls.csv.";
-    Some(Section {
-        title: "Gaps of pulls".into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new("gaps", plot)])],
+    let plot = plots::linear("time, s", unit, drawn.collect());
+    let of = if all > MOST { format!(" Of {all} the {MOST} that reach farthest.") } else { String::new() };
+    (all > 0).then(|| Section {
+        title: title.into(),
+        figures: vec![Figure::choice(format!("{caption}{of}"), vec![Panel::new(title, plot)])],
         ..Section::default()
     })
 }
 
+fn in_millimetres(rows: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    rows.into_iter().map(|(time, metres)| (time, 1e3 * metres)).collect()
+}
+
+fn gaps(outcome: &Outcome) -> Option<Section> {
+    let gaps = outcome.pulls.gaps().into_iter().enumerate();
+    let curves = gaps.map(|(index, rows)| (format!("pull {index}"), in_millimetres(rows))).collect();
+    let caption =
+        "Distance of each pulled point from its target at the frames; points, gaps and forces are in pulls.csv.";
+    over_time("Gaps of pulls", "gap, mm", caption, curves)
+}
+
+fn followed(outcome: &Outcome) -> Option<Section> {
+    let moved = outcome.points.moved().into_iter();
+    let curves = moved.map(|(name, rows)| (name.to_owned(), in_millimetres(rows))).collect();
+    let caption = "How far each followed point is from where it was at the first frame; the points are in points.csv.";
+    over_time("Followed points", "moved by, mm", caption, curves)
+}
+
 fn forces(outcome: &Outcome) -> Option<Section> {
-    let forces = outcome.reactions.forces();
-    if forces.is_empty() {
-        return None;
-    }
-    let curves = forces.into_iter().enumerate().map(|(index, rows)| {
-        let (times, newtons) = rows.into_iter().unzip();
-        Curve::new(format!("instrument {index}"), times, newtons).coloured(COLOURS[index % COLOURS.len()])
-    });
-    let plot = plots::linear("time, s", "force, N", curves.collect());
+    let forces = outcome.reactions.forces().into_iter().enumerate();
+    let curves = forces.map(|(index, rows)| (format!("instrument {index}"), rows)).collect();
     let caption = "Mean force of the tissue on each instrument over short intervals; components and contacts are in reactions.csv.";
-    Some(Section {
-        title: "Forces on instruments".into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new("forces", plot)])],
-        ..Section::default()
-    })
+    over_time("Forces on instruments", "force, N", caption, curves)
 }

@@ -248,7 +248,8 @@ fn add_pulls(summary: &mut Summary, pulls: &PulledPoints) {
 
 /// How far followed points have moved.
 fn add_points(summary: &mut Summary, points: &FollowedPoints) {
-    let moved = points.moved();
+    let at_end = points.moved().into_iter().filter_map(|(name, rows)| Some((name, rows.last()?.1)));
+    let moved: Vec<_> = at_end.collect();
     let Some((name, most)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
     let mean = moved.iter().map(|(_, way)| way).sum::<f64>() / moved.len() as f64;
     let figures: Map<_, _> = moved.iter().map(|(name, way)| ((*name).to_owned(), json!(1e3 * way))).collect();

@@ -29,13 +29,13 @@ impl FollowedPoints {
         Ok(())
     }
 
-    /// Of each point its name, and how far it has moved at the last frame, m.
-    pub(crate) fn moved(&self) -> Vec<(&str, f64)> {
-        let (Some(first), Some(last)) = (self.rows.first(), self.rows.last()) else { return vec![] };
-        let way = |(a, b): (&[f32; 3], &[f32; 3])| {
-            (0..3).map(|axis| f64::from(b[axis] - a[axis]).powi(2)).sum::<f64>().sqrt()
-        };
-        self.names.iter().map(String::as_str).zip(first.1.iter().zip(&last.1).map(way)).collect()
+    /// Of each point its name, and at each frame the time, s, and how far it has moved since the first one, m.
+    pub(crate) fn moved(&self) -> Vec<(&str, Vec<(f64, f64)>)> {
+        let Some((_, first)) = self.rows.first() else { return vec![] };
+        let way =
+            |a: [f32; 3], b: [f32; 3]| (0..3).map(|axis| f64::from(b[axis] - a[axis]).powi(2)).sum::<f64>().sqrt();
+        let of = |index: usize| self.rows.iter().map(move |(time, at)| (*time, way(first[index], at[index]))).collect();
+        self.names.iter().map(String::as_str).zip((0..first.len()).map(of)).collect()
     }
 
     /// `points.csv`, in the coordinates of the mesh.
