@@ -95,18 +95,11 @@ seen = truth.locate(tracked).positions + random.normal(0.0, ERROR, tracked.shape
 
 
 # %% Registration: a rigid fit to begin with, then the points pull.
-def rigid_fit(points, to):
-    a, b = points.mean(axis=0), to.mean(axis=0)
-    u, _, v = np.linalg.svd((points - a).T @ (to - b))
-    turn = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v).T
-    return lambda at: (at - a) @ turn.T + b
-
-
 body, followed = still, still.locate(targets)
 print(f"target registration error, mm: {millimetres(targets, where):.2f} not moved")
 for count in (6, 10, 20):
     at, to = tracked[:count], seen[:count]
-    rigid = rigid_fit(at, to)
+    rigid = supple.rigid_fit(at, to)
     spline = RBFInterpolator(at, to - at, kernel="linear", degree=1)  # that of thin plates in three dimensions
     pulls = body.pull(at, to, stiffness=1000.0)
     body.set_displacements(rigid(mesh.points) - mesh.points)

@@ -1,4 +1,4 @@
-"""The examples as a user runs them: the notebook-like one, and the data set over processes, killed and started again."""
+"""The examples as a user runs them: notebook-like ones, a host, and the data set over processes, killed and started again."""
 
 import re
 import subprocess
@@ -39,6 +39,12 @@ def test_a_ct_follows_tracked_points(tmp_path):
     off, before = map(float, re.search(r"true one: ([\d.]+) of ([\d.]+)", said).groups())
     assert off < 0.25 * before
     assert {path.name for path in tmp_path.iterdir()} == {"ct.nii.gz", "ct-now.nii.gz", "ct-now.h5", "register-ct.png"}
+
+
+def test_a_tumour_follows_tracked_points_over_openigtlink():
+    said = subprocess.run([sys.executable, ROOT / "tests" / "hosts" / "openigtlink_points_client.py"], capture_output=True, text=True)
+    print(said.stdout, said.stderr)
+    assert said.returncode == 0 and "WRONG" not in said.stdout
 
 
 def organs(folder, count):
