@@ -70,6 +70,8 @@ values[np.linalg.norm(places - TUMOUR, axis=1) < RADIUS] = 110.0
 shape = sitk.GetArrayFromImage(grid).shape
 ct = sitk.GetImageFromArray((values + random.normal(0.0, 5.0, len(values))).reshape(shape).astype(np.float32))
 ct.CopyInformation(grid)
+labels = sitk.GetImageFromArray(inside.reshape(shape).astype(np.uint8))
+labels.CopyInformation(grid)
 
 # %% The truth: the lobe hangs from a patch of its back, lies on two pads, and is turned.
 fine = refined(mesh)
@@ -127,6 +129,9 @@ field = body.field(ct, "inverse")
 warped = field.warp(ct)
 ideal = truth.field(ct, "inverse").warp(ct)
 supple.write_image(ct, OUT / "ct.nii.gz")
+supple.write_image(labels, OUT / "labels.nii.gz")
+supple.write_image(ideal, OUT / "ct-true.nii.gz")
+np.savetxt(OUT / "points.csv", 1e3 * np.hstack([tracked, seen]), "%.3f", ",")
 supple.write_image(warped, OUT / "ct-now.nii.gz")
 field.write(OUT / "ct-now.h5")
 now, best = sitk.GetArrayFromImage(warped), sitk.GetArrayFromImage(ideal)

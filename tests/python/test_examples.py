@@ -5,8 +5,11 @@ import subprocess
 import sys
 import time
 
+import meshio
 import numpy as np
 import pytest
+import SimpleITK as sitk
+import supple
 from conftest import ROOT
 
 
@@ -23,7 +26,7 @@ def test_a_ball_on_a_lobe_makes_its_picture(tmp_path):
     assert (tmp_path / "pressed.vtu").stat().st_size > 100_000
 
 
-def test_a_ct_follows_tracked_points(tmp_path):
+def test_a_ct_follows_tracked_points(tmp_path, monkeypatch):
     said = subprocess.run(
         [sys.executable, ROOT / "examples" / "register_ct.py", ROOT / "meshes" / "lobe.msh", tmp_path],
         check=True, capture_output=True, text=True,
@@ -38,7 +41,22 @@ def test_a_ct_follows_tracked_points(tmp_path):
     assert wrong < 1.2 * errors[20][2] and gap > 3.0 * others
     off, before = map(float, re.search(r"true one: ([\d.]+) of ([\d.]+)", said).groups())
     assert off < 0.25 * before
-    assert {path.name for path in tmp_path.iterdir()} == {"ct.nii.gz", "ct-now.nii.gz", "ct-now.h5", "register-ct.png"}
+    files = {"ct.nii.gz", "labels.nii.gz", "points.csv", "ct-now.nii.gz", "ct-now.h5", "ct-true.nii.gz", "register-ct.png"}
+    assert {path.name for path in tmp_path.iterdir()} == files
+
+    # The lines of docs/registration.md, with these files.
+    whole, frames = re.findall(r"^```python$(.*?)^```$", (ROOT / "docs" / "registration.md").read_text(), flags=re.M | re.S)[:2]
+    lobe = supple.Mesh.read(ROOT / "meshes" / "lobe.msh")
+    meshio.write(tmp_path / "organ.msh", meshio.Mesh(1e3 * lobe.points.astype(float), [("tetra", lobe.tets)]), file_format="gmsh22")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ct-now.nii.gz").unlink()
+    exec(whole, names := {})
+    ct, now, true = (sitk.GetArrayFromImage(sitk.ReadImage(f"{name}.nii.gz")).astype(float) for name in ("ct", "ct-now", "ct-true"))
+    print(f"{np.abs(now - true).mean():.1f} of {np.abs(ct - true).mean():.1f}")
+    assert np.abs(now - true).mean() < 0.25 * np.abs(ct - true).mean()
+    names |= {"tumour_points": [[0.005, 0.0, 0.032]], "tracker": [names["at"]] * 60}
+    exec(frames, names)
+    assert np.allclose(names["tumour"].positions, names["tumour_points"], atol=1e-4)
 
 
 def test_a_tumour_follows_tracked_points_over_openigtlink():

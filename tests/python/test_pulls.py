@@ -98,6 +98,8 @@ def test_what_cannot_be_is_refused(soft):
             simulation.pull(at, **arguments)
     with pytest.raises(supple.InputError, match="no node is nearer"):
         simulation.pull([[1.0, 0.0, 0.0]], radius=0.001)
+    with pytest.warns(RuntimeWarning, match="point 1 is 5 mm outside the tissue: is it in metres"):
+        simulation.pull([*at, [0.01, 0.01, 0.065]], radius=0.009).release()
     pulls = simulation.pull(at)
     with pytest.raises(supple.InputError, match="targets"):
         pulls.move([[np.inf, 0.0, 0.0]])
