@@ -74,7 +74,8 @@ class Client:
         """The image, from places now to places in the CT; at the surface it is limited by the grid."""
         image = self.latest("Displacement")
         inside, all_nodes = (off(from_image(image, motion(at)), at) for at in (BALL, NODES))
-        what = f"the field of {image.image.shape} points leads back to the CT: {inside:.3f} mm off in the tumour, {all_nodes:.2f} mm at all nodes"
+        what = f"the field of {image.image.shape} points leads back to the CT"
+        what += f": {inside:.3f} mm off in the tumour, {all_nodes:.2f} mm at all nodes"
         check(what, image.world_coordinate_system == "ras" and inside < allowed and all_nodes < allowed + 1.0)
 
 

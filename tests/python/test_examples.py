@@ -59,6 +59,17 @@ def test_a_ct_follows_tracked_points(tmp_path, monkeypatch):
     assert np.allclose(names["tumour"].positions, names["tumour_points"], atol=1e-4)
 
 
+def test_a_part_of_the_surface_registers_without_pairs():
+    said = subprocess.run(
+        [sys.executable, ROOT / "examples" / "register_surface.py", "--state", "packed"], check=True, capture_output=True, text=True
+    ).stdout
+    print(said)
+    errors = {name.strip(): float(mean) for name, mean in re.findall(r"^  (.*?) +([\d.]+) \(", said, flags=re.M)}
+    assert errors["surface"] < 0.85 * errors["rigid of 3"] and errors["surface"] < 0.5 * errors["rigid ICP"]
+    for count in (3, 6):
+        assert errors[f"surface and {count} pairs"] < 0.8 * min(errors[f"{count} pairs"], errors["surface"])
+
+
 def test_a_tumour_follows_tracked_points_over_openigtlink():
     said = subprocess.run([sys.executable, ROOT / "tests" / "hosts" / "openigtlink_points_client.py"], capture_output=True, text=True)
     print(said.stdout, said.stderr)
