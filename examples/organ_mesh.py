@@ -38,8 +38,11 @@ def surface_of_label(path, label):
     if count == 0:
         known = np.unique(sitk.GetArrayViewFromImage(image))
         stop(f"{path}: no voxel has the label {label}; there are {', '.join(str(each) for each in known[:20])}")
-    # Labels that reach the end of the image are closed there.
-    here = sitk.ConstantPad(here, [3] * 3, [3] * 3, 0)
+    # The organ's box of a large scan. Labels that reach the end of the image are closed there.
+    shape = sitk.LabelShapeStatisticsImageFilter()
+    shape.Execute(here)
+    box = shape.GetBoundingBox(1)
+    here = sitk.ConstantPad(sitk.RegionOfInterest(here, box[3:], box[:3]), [3] * 3, [3] * 3, 0)
     spacing = np.array(here.GetSpacing())
     smooth = sitk.SmoothingRecursiveGaussian(sitk.Cast(here, sitk.sitkFloat32), float(spacing.max()))
     values = sitk.GetArrayFromImage(smooth).transpose(2, 1, 0)

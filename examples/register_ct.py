@@ -19,6 +19,7 @@ import matplotlib
 import numpy as np
 import SimpleITK as sitk
 import supple
+from lobe_truth import truth
 from scipy.interpolate import RBFInterpolator
 
 matplotlib.use("Agg")
@@ -31,19 +32,6 @@ SPACING = 2.0  # mm, of the CT
 TUMOUR, RADIUS = np.array([0.005, 0.0, 0.032]), 0.008  # m
 random = np.random.default_rng(1)
 OUT.mkdir(parents=True, exist_ok=True)
-
-
-def refined(mesh):
-    """Each tetrahedron in eight."""
-    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
-    edges = np.sort(np.stack([mesh.tets[:, pair] for pair in pairs], axis=1), axis=2)
-    unique, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
-    a, b, c, d = mesh.tets.T
-    ab, ac, ad, bc, bd, cd = (place.reshape(-1, 6) + len(mesh.points)).T
-    eight = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d)]
-    eight += [(ab, bc, ac, ad), (ab, bd, bc, ad), (bc, cd, ac, ad), (bc, bd, cd, ad)]
-    middles = mesh.points[unique].mean(axis=1)
-    return supple.Mesh(np.concatenate([mesh.points, middles]), np.concatenate([np.stack(each, axis=1) for each in eight]))
 
 
 def millimetres(a, b):
@@ -70,20 +58,13 @@ values[np.linalg.norm(places - TUMOUR, axis=1) < RADIUS] = 110.0
 shape = sitk.GetArrayFromImage(grid).shape
 ct = sitk.GetImageFromArray((values + random.normal(0.0, 5.0, len(values))).reshape(shape).astype(np.float32))
 ct.CopyInformation(grid)
+labels = sitk.GetImageFromArray(inside.reshape(shape).astype(np.uint8))
+labels.CopyInformation(grid)
 
 # %% The truth: the lobe hangs from a patch of its back, lies on two pads, and is turned.
-fine = refined(mesh)
-x, y, z = fine.points.T
-scene = supple.Scene(
-    fine, supple.Material("exponential", a=1500.0, b=8.023, d=40000.0, density=1060.0),
-    fixed=(np.abs(x + 0.03) < 0.02) & (y > 0.025), element="nodal-pressure",
-)  # fmt: skip
-truth = supple.Simulation(scene, gravity=(2.0, -3.0, -8.0))
-pads = [supple.Instrument.sphere(0.03, (0.03, -0.01, -0.030)), supple.Instrument.sphere(0.02, (-0.04, -0.05, -0.03))]
-truth.set_instruments(pads)
-print("truth:", truth.settle(1e-4))
+moved = truth(mesh, "packed")
 targets = np.concatenate([places[inside & of_vessel][:: max(1, (inside & of_vessel).sum() // 100)], TUMOUR + random.normal(0, 0.003, (50, 3))])
-where = truth.locate(targets).positions.astype(float)
+where = moved.locate(targets).positions.astype(float)
 
 # %% Points of the surface, far from each other, seen with an error.
 surface = mesh.points[np.unique(mesh.boundary())].astype(float)
@@ -91,22 +72,15 @@ chosen = [0]
 for _ in range(19):
     chosen.append(int(np.min(np.linalg.norm(surface[:, None] - surface[chosen], axis=2), axis=1).argmax()))
 tracked = surface[chosen]
-seen = truth.locate(tracked).positions + random.normal(0.0, ERROR, tracked.shape)
+seen = moved.locate(tracked).positions + random.normal(0.0, ERROR, tracked.shape)
 
 
 # %% Registration: a rigid fit to begin with, then the points pull.
-def rigid_fit(points, to):
-    a, b = points.mean(axis=0), to.mean(axis=0)
-    u, _, v = np.linalg.svd((points - a).T @ (to - b))
-    turn = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v).T
-    return lambda at: (at - a) @ turn.T + b
-
-
 body, followed = still, still.locate(targets)
 print(f"target registration error, mm: {millimetres(targets, where):.2f} not moved")
 for count in (6, 10, 20):
     at, to = tracked[:count], seen[:count]
-    rigid = rigid_fit(at, to)
+    rigid = supple.rigid_fit(at, to)
     spline = RBFInterpolator(at, to - at, kernel="linear", degree=1)  # that of thin plates in three dimensions
     pulls = body.pull(at, to, stiffness=1000.0)
     body.set_displacements(rigid(mesh.points) - mesh.points)
@@ -132,8 +106,11 @@ body.settle(1e-4)
 # %% The CT as it looks now, and the field as a transform that 3D Slicer opens.
 field = body.field(ct, "inverse")
 warped = field.warp(ct)
-ideal = truth.field(ct, "inverse").warp(ct)
+ideal = moved.field(ct, "inverse").warp(ct)
 supple.write_image(ct, OUT / "ct.nii.gz")
+supple.write_image(labels, OUT / "labels.nii.gz")
+supple.write_image(ideal, OUT / "ct-true.nii.gz")
+np.savetxt(OUT / "points.csv", 1e3 * np.hstack([tracked, seen]), "%.3f", ",")
 supple.write_image(warped, OUT / "ct-now.nii.gz")
 field.write(OUT / "ct-now.h5")
 now, best = sitk.GetArrayFromImage(warped), sitk.GetArrayFromImage(ideal)

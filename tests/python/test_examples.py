@@ -1,12 +1,15 @@
-"""The examples as a user runs them: the notebook-like one, and the data set over processes, killed and started again."""
+"""The examples as a user runs them: notebook-like ones, a host, and the data set over processes, killed and started again."""
 
 import re
 import subprocess
 import sys
 import time
 
+import meshio
 import numpy as np
 import pytest
+import SimpleITK as sitk
+import supple
 from conftest import ROOT
 
 
@@ -23,7 +26,7 @@ def test_a_ball_on_a_lobe_makes_its_picture(tmp_path):
     assert (tmp_path / "pressed.vtu").stat().st_size > 100_000
 
 
-def test_a_ct_follows_tracked_points(tmp_path):
+def test_a_ct_follows_tracked_points(tmp_path, monkeypatch):
     said = subprocess.run(
         [sys.executable, ROOT / "examples" / "register_ct.py", ROOT / "meshes" / "lobe.msh", tmp_path],
         check=True, capture_output=True, text=True,
@@ -38,7 +41,39 @@ def test_a_ct_follows_tracked_points(tmp_path):
     assert wrong < 1.2 * errors[20][2] and gap > 3.0 * others
     off, before = map(float, re.search(r"true one: ([\d.]+) of ([\d.]+)", said).groups())
     assert off < 0.25 * before
-    assert {path.name for path in tmp_path.iterdir()} == {"ct.nii.gz", "ct-now.nii.gz", "ct-now.h5", "register-ct.png"}
+    files = {"ct.nii.gz", "labels.nii.gz", "points.csv", "ct-now.nii.gz", "ct-now.h5", "ct-true.nii.gz", "register-ct.png"}
+    assert {path.name for path in tmp_path.iterdir()} == files
+
+    # The lines of docs/registration.md, with these files.
+    whole, frames = re.findall(r"^```python$(.*?)^```$", (ROOT / "docs" / "registration.md").read_text(), flags=re.M | re.S)[:2]
+    lobe = supple.Mesh.read(ROOT / "meshes" / "lobe.msh")
+    meshio.write(tmp_path / "organ.msh", meshio.Mesh(1e3 * lobe.points.astype(float), [("tetra", lobe.tets)]), file_format="gmsh22")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ct-now.nii.gz").unlink()
+    exec(whole, names := {})
+    ct, now, true = (sitk.GetArrayFromImage(sitk.ReadImage(f"{name}.nii.gz")).astype(float) for name in ("ct", "ct-now", "ct-true"))
+    print(f"{np.abs(now - true).mean():.1f} of {np.abs(ct - true).mean():.1f}")
+    assert np.abs(now - true).mean() < 0.25 * np.abs(ct - true).mean()
+    names |= {"tumour_points": [[0.005, 0.0, 0.032]], "tracker": [names["at"]] * 60}
+    exec(frames, names)
+    assert np.allclose(names["tumour"].positions, names["tumour_points"], atol=1e-4)
+
+
+def test_a_part_of_the_surface_registers_without_pairs():
+    said = subprocess.run(
+        [sys.executable, ROOT / "examples" / "register_surface.py", "--state", "packed"], check=True, capture_output=True, text=True
+    ).stdout
+    print(said)
+    errors = {name.strip(): float(mean) for name, mean in re.findall(r"^  (.*?) +([\d.]+) \(", said, flags=re.M)}
+    assert errors["surface"] < 0.85 * errors["rigid of 3"] and errors["surface"] < 0.5 * errors["rigid ICP"]
+    for count in (3, 6):
+        assert errors[f"surface and {count} pairs"] < 0.8 * min(errors[f"{count} pairs"], errors["surface"])
+
+
+def test_a_tumour_follows_tracked_points_over_openigtlink():
+    said = subprocess.run([sys.executable, ROOT / "tests" / "hosts" / "openigtlink_points_client.py"], capture_output=True, text=True)
+    print(said.stdout, said.stderr)
+    assert said.returncode == 0 and "WRONG" not in said.stdout
 
 
 def organs(folder, count):

@@ -1,4 +1,4 @@
-"""Pulls: a weight on a spring, registration from points with errors, lost and wrong points, and what is refused."""
+"""Pulls: a weight on a spring, registration from points with errors, lost and wrong points, rigid fits, and what is refused."""
 
 import numpy as np
 import pytest
@@ -15,6 +15,26 @@ def test_a_pull_carries_the_weight(soft):
     assert pulls.forces[0] == pytest.approx([0.0, 0.0, weight], abs=0.01 * weight)
     assert pulls.gaps[0] == pytest.approx([0.0, 0.0, weight / 100.0], abs=0.01 * weight / 100.0)
     assert pulls.points[0, 2] == pytest.approx(0.06 - weight / 100.0, abs=1e-5)
+
+
+def test_a_rigid_fit_finds_the_motion_and_says_what_it_lacks():
+    random = np.random.default_rng(2)
+    points = random.normal(size=(6, 3))
+    turn, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    turn *= np.linalg.det(turn)
+    seen = points @ turn.T + [1.0, 2.0, 3.0]
+    seen[4] = np.nan
+    for count in (6, 3):
+        fit = supple.rigid_fit(points[:count], seen[:count])
+        assert np.allclose(fit.turn, turn) and np.allclose(fit(points), points @ turn.T + [1.0, 2.0, 3.0])
+    assert np.allclose(fit.matrix() @ [*points[4], 1.0], [*fit(points[4]), 1.0])
+    for given, words in [
+        ((points[3:], seen[3:]), "2 of 3 points are seen, at least 3"),
+        ((np.outer(range(5), [1.0, 1.0, 0.0]), points[:5]), "the 5 points that are seen lie on a line"),
+        ((points, seen[:5]), r"points of shape \(6, 3\), seen of shape \(5, 3\)"),
+    ]:
+        with pytest.raises(supple.InputError, match=words):
+            supple.rigid_fit(*given)
 
 
 def bent(points):
@@ -78,6 +98,8 @@ def test_what_cannot_be_is_refused(soft):
             simulation.pull(at, **arguments)
     with pytest.raises(supple.InputError, match="no node is nearer"):
         simulation.pull([[1.0, 0.0, 0.0]], radius=0.001)
+    with pytest.warns(RuntimeWarning, match="point 1 is 5 mm outside the tissue: is it in metres"):
+        simulation.pull([*at, [0.01, 0.01, 0.065]], radius=0.009).release()
     pulls = simulation.pull(at)
     with pytest.raises(supple.InputError, match="targets"):
         pulls.move([[np.inf, 0.0, 0.0]])

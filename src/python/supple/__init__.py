@@ -19,7 +19,7 @@ from .fitting import Fit, fit
 from .images import Field, Grid, displacement_field, read_image, write_image
 from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
-from .points import FollowedPoints
+from .points import FollowedPoints, Rigid, rigid_fit
 from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
@@ -28,8 +28,8 @@ from .simulation import METHODS, Pressure, Report, Settled, Simulation
 
 __all__ = [
     "METHODS", "Diverged", "Error", "Field", "Fit", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh",
-    "Pressure", "Pulls", "Reaction", "ReactionForce", "Report", "Scene", "Settled", "Simulation", "Touch", "Unloaded", "UnstableStep",
-    "displacement_field", "fit", "level", "read_image", "unloaded", "version", "write_image",
+    "Pressure", "Pulls", "Reaction", "ReactionForce", "Report", "Rigid", "Scene", "Settled", "Simulation", "Touch", "Unloaded", "UnstableStep",
+    "displacement_field", "fit", "level", "read_image", "rigid_fit", "unloaded", "version", "write_image",
 ]
 
 

@@ -1,7 +1,8 @@
-"""Points that follow the tissue: a tumour, vessels, a finer surface, targets."""
+"""Points that follow the tissue: a tumour, vessels, a finer surface, targets. And the rigid motion that is nearest to theirs."""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _library as library
 from ._library import ffi, lib
+from .errors import InputError
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -84,3 +86,41 @@ class FollowedPoints:
     def __repr__(self) -> str:
         outside = int(np.count_nonzero(self.distances))
         return f"<supple.FollowedPoints: {len(self)}, {outside} of them outside>"
+
+
+@dataclasses.dataclass(frozen=True)
+class Rigid:
+    """A rigid motion: `turn` (3, 3), then `shift` (m). Called with points (m, (n, 3)) it gives where they go."""
+
+    turn: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        moved: NDArray[np.float64] = np.asarray(points, np.float64) @ self.turn.T + self.shift
+        return moved
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Of shape (4, 4), in m."""
+        made = np.eye(4)
+        made[:3, :3], made[:3, 3] = self.turn, self.shift
+        return made
+
+
+def rigid_fit(points: ArrayLike, seen: ArrayLike) -> Rigid:
+    """The rigid motion that brings points (m, (n, 3)) nearest to where they are seen, by least squares. Rows with a NaN are left out: a point that
+    is not seen. Three points that do not lie on a line are needed."""
+    a, b = np.asarray(points, np.float64), np.asarray(seen, np.float64)
+    if a.shape != b.shape or a.ndim != 2 or a.shape[1] != 3:
+        raise InputError(f"rigid fit: points of shape {a.shape}, seen of shape {b.shape}; both must be (n, 3)")
+    there, all_points = np.flatnonzero(np.isfinite(a + b).all(axis=1)), len(a)
+    a, b = a[there], b[there]
+    if len(a) < 3:
+        raise InputError(f"rigid fit: {len(a)} of {all_points} points are seen, at least 3 are needed")
+    from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
+    for rows in (from_a, from_b):
+        _, width, length = np.linalg.eigvalsh(rows.T @ rows)
+        if width <= 1e-4 * length:
+            raise InputError(f"rigid fit: the {len(a)} points that are seen lie on a line, one more off that line is needed")
+    u, _, v = np.linalg.svd(from_a.T @ from_b)
+    turn = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v).T
+    return Rigid(turn, b.mean(axis=0) - turn @ a.mean(axis=0))

@@ -381,7 +381,12 @@ class Simulation:
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent."""
         radius = _PATCH * self.scene._edge if radius is None else radius
         wanted = wanted_of(points, radius, stiffness, most, along)
-        made = Pulls(self, wanted)
+        made, outside = Pulls(self, wanted), self.locate(wanted.points).distances
+        if outside.max(initial=0.0) > 0.5 * radius:
+            warnings.warn(
+                f"pulls: point {outside.argmax()} is {1e3 * outside.max():.3g} mm outside the tissue: is it in metres, and in the axes of the mesh?",
+                RuntimeWarning, stacklevel=3,
+            )  # fmt: skip
         groups = [*self._pull_groups, wanted]
         if targets is not None:
             array = np.array(targets, np.float32)
