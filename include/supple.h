@@ -304,8 +304,9 @@
 /**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
- * afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
- * supple_learned_step says of a refused one. Numbers are never given another meaning.
+ * afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large
+ * keeps the inertia that a refused step had computed for other pulls, and what supple_learned_step says of a refused
+ * one. Numbers are never given another meaning.
  */
 enum supple_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -383,7 +384,7 @@ enum supple_status
      */
     SUPPLE_E_INDEX = -10,
     /**
-     * Entry or node `index` has a number (value) that is NaN or infinite.
+     * Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of a pressed point beyond 1e6 m.
      */
     SUPPLE_E_NOT_FINITE = -11,
     /**
@@ -1934,7 +1935,7 @@ supple_status supple_set_pressure(supple_loads *loads,
 
 /**
  * Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
- * on it at its time, with what fills it.
+ * on it at its time, with what fills it. SUPPLE_E_NOT_FINITE where nodes are so far away that this is no number.
  *
  * @param cubic_metres may be NULL; receives the volume, m^3.
  * @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
@@ -2040,6 +2041,7 @@ supple_status supple_set_targets(supple_pulls *pulls,
 
 /**
  * Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.
+ * SUPPLE_E_NOT_FINITE where nodes are so far away that one of these is no number.
  */
 supple_status supple_read_pulls(supple_pulls *pulls,
                                 supple_state *state,

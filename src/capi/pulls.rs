@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::mem::take;
 
-use crate::pulls::{Pull, PullError, PulledNode, Pulls, let_go, patch, usual_most};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, let_go, patch, usual_most};
 use crate::state::{NodeVector, StateView};
 
 use super::loads::supple_loads;
@@ -353,6 +353,7 @@ pub unsafe extern "C" fn supple_set_targets(
 }
 
 /// Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.
+/// SUPPLE_E_NOT_FINITE where nodes are so far away that one of these is no number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_read_pulls(
     pulls: *mut supple_pulls,
@@ -376,11 +377,15 @@ pub unsafe extern "C" fn supple_read_pulls(
         let parts = object.parts(arrays);
         let list = parts.pulls.get(..count as usize).unwrap_or_default();
         let all = Pulls::unchecked(object.scene_nodes as usize, parts.nodes, list);
-        for (index, pull) in list.iter().enumerate() {
-            let Some(read) = all.read(index, state.displacements(), parts.forces, state.time()) else { continue };
+        let read =
+            || (0..list.len()).filter_map(|index| all.read(index, state.displacements(), parts.forces, state.time()));
+        let is_finite = |vectors: [[f32; 3]; 3]| vectors.as_flattened().iter().all(|value| value.is_finite());
+        if let Some(index) = read().position(|Pulled { point, gap, force }| !is_finite([point, gap, force])) {
+            return Err(supple_error::from(SUPPLE_E_NOT_FINITE).at(index));
+        }
+        for (index, (pull, Pulled { point, gap, force })) in list.iter().zip(read()).enumerate() {
             let is_absent = pull.stiffness == 0.0;
-            let gap = if is_absent { [0.0; 3] } else { read.gap };
-            pulled.add(index).write(supple_pulled { point: read.point, gap, force: read.force });
+            pulled.add(index).write(supple_pulled { point, gap: if is_absent { [0.0; 3] } else { gap }, force });
         }
         Ok(SUPPLE_OK)
     };
@@ -422,12 +427,13 @@ impl<'a> CallPulls<'a> {
     ///
     /// # Safety
     /// As at [`memory::change`].
-    pub(super) unsafe fn of(pulls: *mut supple_pulls) -> Answer<Option<Self>> {
+    pub(super) unsafe fn of(pulls: *mut supple_pulls, scene: &OpenScene<'_>) -> Answer<Option<Self>> {
         if pulls.is_null() || !cfg!(feature = "contact") {
             return Ok(None);
         }
         // SAFETY: the caller's promise.
         let (object, arrays) = unsafe { memory::open(pulls)? };
+        scene.fits(object.scene_nodes)?;
         // SAFETY: as above.
         let PullArrays { nodes, pulls, forces, .. } = unsafe { object.parts(arrays) };
         let pulls = pulls.get(..object.pulls as usize).unwrap_or_default();

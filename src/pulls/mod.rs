@@ -30,6 +30,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::loads::FARTHEST;
 use crate::material::{Material, Moduli};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -75,7 +76,7 @@ pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
         return true;
     }
     let left: f32 = nodes.iter().filter(|pulled| is_left(pulled.node)).map(|pulled| pulled.weight).sum();
-    if left <= 0.0 {
+    if left < LEAST_WEIGHT {
         return false;
     }
     for pulled in nodes {
@@ -121,7 +122,7 @@ impl Pull {
         if time >= end {
             return self.to.into();
         }
-        let share = ((time - start) / (end - start)).max(0.0) as f32;
+        let share = ((time - start) / (end - start)).clamp(0.0, 1.0) as f32;
         let [from, to] = [self.from, self.to].map(Vec3::from_array);
         from + share * (to - from)
     }
@@ -156,7 +157,7 @@ impl Pull {
         }
         let vectors = [("point", self.at), ("direction", self.along), ("target", self.from), ("target", self.to)];
         for (what, vector) in vectors {
-            if let Some(&value) = vector.iter().find(|component| !component.is_finite()) {
+            if let Some(&value) = vector.iter().find(|component| !is_bounded(**component)) {
                 return Err(PullError::Value { pull: index, what, value });
             }
         }
@@ -184,6 +185,14 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
     0.75 * Moduli::of(&tissue.law).shear as f32 * edge * edge
 }
 
+/// Whether a coordinate (m) or a weight is one.
+fn is_bounded(value: f32) -> bool {
+    value.abs() <= FARTHEST
+}
+
+/// Below this sum of weights nothing is left of a pull.
+const LEAST_WEIGHT: f32 = 1e-6;
+
 /// The stiffest pull, N/m.
 pub const MOST_STIFFNESS: f32 = 1e6;
 
@@ -202,7 +211,7 @@ impl<'a> Pulls<'a> {
             if pulled.node as usize >= scene_nodes {
                 return Err(PullError::Node { index, node: pulled.node, nodes: scene_nodes });
             }
-            if !pulled.weight.is_finite() {
+            if !is_bounded(pulled.weight) {
                 return Err(PullError::Weight { index, value: pulled.weight });
             }
         }
@@ -271,7 +280,7 @@ pub enum PullError {
         /// Nodes of the scene.
         nodes: usize,
     },
-    /// A weight is not a finite number.
+    /// A weight is not a number, or beyond 1e6.
     Weight {
         /// Place in the list of nodes.
         index: usize,
@@ -321,7 +330,10 @@ impl fmt::Display for PullError {
                 write!(f, "entry {index} of the pulled nodes: node {node} does not exist, the scene has {nodes} nodes")
             }
             Self::Weight { index, value } => {
-                write!(f, "entry {index} of the pulled nodes: a weight of {value}, it must be a finite number")
+                write!(
+                    f,
+                    "entry {index} of the pulled nodes: a weight of {value}, it must be a number up to {FARTHEST:e}"
+                )
             }
             Self::Range { pull, first, count, nodes } => write!(
                 f,
@@ -334,7 +346,7 @@ impl fmt::Display for PullError {
                 write!(f, "pull {pull}: a most force of {value} N, it must be zero or more, infinite for no limit")
             }
             Self::Value { pull, what, value } => {
-                write!(f, "pull {pull}: a component of its {what} is {value}, it must be a finite number")
+                write!(f, "pull {pull}: a component of its {what} is {value}, it must be a number up to {FARTHEST:e}")
             }
             Self::Nothing { radius, nearest } => write!(
                 f,
@@ -350,3 +362,21 @@ impl fmt::Display for PullError {
 }
 
 impl core::error::Error for PullError {}
+
+#[cfg(test)]
+mod tests {
+    use super::Pull;
+
+    #[test]
+    fn a_target_stays_between_where_it_was_and_where_it_goes() {
+        let mut pull = Pull::new([0, 1], [0.0; 3], 1.0);
+        // Also where the host has mistaken the times.
+        for [from, to] in [[1.0, 2.0], [2.0, 1.0], [2.0, f64::MIN_POSITIVE], [1.0, 1.0]] {
+            pull.put([0.0; 3]);
+            pull.move_to([1.0; 3], from, to);
+            for time in [0.0, 0.5, 1.0, 1.5, 3.0] {
+                assert!((0.0..=1.0).contains(&pull.target(time).x), "{from} {to} {time}");
+            }
+        }
+    }
+}

@@ -9,6 +9,7 @@ SUPPLE_MEMORY(first_memory, ROOM);
 SUPPLE_MEMORY(second_memory, ROOM);
 SUPPLE_MEMORY(third_memory, ROOM);
 SUPPLE_MEMORY(contact_memory, 1 << 20);
+SUPPLE_MEMORY(pulls_memory, 1 << 10);
 static uint8_t removed[TETS];
 static supple_scene_config body;
 static float of_one[NODES][3], of_other[NODES][3], frozen[NODES][3];
@@ -201,6 +202,16 @@ static void refusals_change_nothing(void) {
     CHECK(supple_contact_carry_on(objects_of(first).contact, objects_of(first).scene, NULL) == SUPPLE_E_NULL);
     CHECK(supple_contact_carry_on(objects_of(first).contact, objects_of(first).scene, objects_of(first).contact) == SUPPLE_E_OVERLAP);
     CHECK(hash(first_memory, ROOM) == before && hash(second_memory, ROOM) == after);
+    /* Pulls whose memory is used for something else by now. */
+    supple_pulls *pulls;
+    CHECK(supple_pulls_init(pulls_memory, sizeof pulls_memory, objects_of(first).scene, 1, 1, &pulls) == SUPPLE_OK);
+    CHECK(supple_set_pulls(objects_of(first).loads, pulls) == SUPPLE_OK);
+    memset(pulls_memory, 0, sizeof pulls_memory);
+    CHECK(supple_sim_setup(second_memory, bytes, &body, &settings, &second, NULL) == SUPPLE_OK);
+    const uint64_t without = hash(second_memory, ROOM);
+    CHECK(supple_sim_carry_on(second, first, &settings, NULL) == SUPPLE_E_NOT_INITIALISED && hash(second_memory, ROOM) == without);
+    CHECK(supple_set_pulls(objects_of(first).loads, NULL) == SUPPLE_OK);
+    CHECK(hash(first_memory, ROOM) == before);
     /* Marks that are none, all of them, and another body. */
     removed[17] = 2;
     CHECK(supple_sim_setup(third_memory, bytes, &body, &settings, &none, &error) == SUPPLE_E_CHOICE && error.index == 17);

@@ -1060,6 +1060,7 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_MISMATCH, supple_set_targets(made, targets[0], 1, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, INFINITY, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     CHECK(error.index == 0);
+    REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, 3e6f, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     DONE(supple_set_targets(made, targets[0], 2, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_pulls(small_loads, made));
     REFUSED(SUPPLE_E_KIND, supple_set_pulls(acts, (supple_pulls *)(void *)state));
@@ -1076,6 +1077,14 @@ static void pulls(void) {
     CHECK(fabsf(read[0].force[0] - pull.stiffness * read[0].gap[0]) < 1e-3f * read[0].force[0]);
     CHECK(read[1].force[0] == 0.0f && read[1].gap[0] == 0.0f);
 
+    /* A step that is refused leaves no force. */
+    const float strong = 1e9f;
+    DONE(supple_set_forces(acts, &(const supple_force){NODES / 2, {strong, 0, 0}, 0}, 1, &error));
+    CHECK(supple_step(scene, acts, state, 1, NULL, &report) == SUPPLE_E_DIVERGED_FORCE);
+    DONE(supple_set_forces(acts, NULL, 0, &error));
+    DONE(supple_read_pulls(made, state, read, 2));
+    CHECK(read[0].force[0] == 0.0f && read[0].gap[0] > 0.0f);
+
     /* Learned steps do not know pulls. */
     supple_learned_facts facts;
     DONE(supple_state_reset(state));
@@ -1087,6 +1096,15 @@ static void pulls(void) {
     CHECK(supple_learned_step(scene, acts, state, learned, 1, NULL, &report) == SUPPLE_E_NO_PULLS);
     note(SUPPLE_E_NO_PULLS);
     DONE(supple_set_pulls(acts, NULL));
+
+    /* Nodes as far away as numbers go. */
+    static float far[NODES][3];
+    const float two = 2.0f;
+    far[NODES - 1][1] = 3e38f;
+    DONE(supple_pulls_init(memory, bytes, scene, MOST, ROOM, &made));
+    DONE(supple_add_pull_of_nodes(made, scene, corners, &two, 1, &pull, &error));
+    DONE(supple_set_displacements(scene, state, far[0], NODES, &error));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_read_pulls(made, state, read, 1));
     DONE(supple_state_reset(state));
 }
 
@@ -1120,6 +1138,9 @@ static void images(void) {
     CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
     located[1].nodes[3] = 0, located[1].weights[0] = INFINITY;
     REFUSED(SUPPLE_E_NOT_FINITE, FOLLOW(moved[0], NULL));
+    located[1].weights[0] = 1e30f;
+    REFUSED(SUPPLE_E_NOT_FINITE, FOLLOW(moved[0], NULL));
+    CHECK(error.index == 1 && error.value == (double)1e30f);
 
     const supple_image_grid good = {{0, 0, 0}, {0.01, 0.01, 0.01}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {3, 3, 3}};
     supple_image_grid bad = good;
