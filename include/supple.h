@@ -302,6 +302,11 @@
 #define SUPPLE_REMARK_THIN 12
 
 /**
+ * All nodes of pull `index` are held: it moves nothing.
+ */
+#define SUPPLE_REMARK_HELD_PULL 13
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
  * afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large

@@ -693,7 +693,7 @@ static void remarks(supple_scene_config config) {
     DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
     CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
     CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
-    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_THIN; kind++) {
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_HELD_PULL; kind++) {
         CHECK(strlen(supple_remark_text(kind)) > 10);
     }
     CHECK(strcmp(supple_remark_text(0), "?") == 0);
@@ -1065,6 +1065,11 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_MISMATCH, supple_set_pulls(small_loads, made));
     REFUSED(SUPPLE_E_KIND, supple_set_pulls(acts, (supple_pulls *)(void *)state));
     DONE(supple_set_pulls(acts, made));
+    /* The corner is held. */
+    supple_remark told[2];
+    uint32_t count = 0;
+    DONE(supple_remarks(scene, points[0], acts, NULL, told, 2, &count));
+    CHECK(count == 1 && told[0].kind == SUPPLE_REMARK_HELD_PULL && told[0].index == 1);
     supple_report report;
     supple_pulled read[2];
     DONE(supple_state_reset(state));
