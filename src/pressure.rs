@@ -78,6 +78,12 @@ impl PressedTriangle {
         }
     }
 
+    /// Its surface.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn surface(&self) -> u32 {
+        self.surface
+    }
+
     /// Its nodes.
     #[must_use]
     pub const fn nodes(&self) -> [u32; 3] {
@@ -133,7 +139,8 @@ pub struct Pressure<'a> {
 }
 
 impl<'a> Pressure<'a> {
-    /// Checks triangles and the pressures of their surfaces against the scene they will act on.
+    /// Checks triangles and the pressures of their surfaces against the scene they will act on. The triangles of a surface
+    /// that fills should stand together: each change of the surface from one to the next costs a sum over all.
     pub fn new(
         scene: &impl AsScene,
         triangles: &'a [PressedTriangle],

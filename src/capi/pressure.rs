@@ -2,6 +2,7 @@
 
 use core::ffi::c_void;
 
+use crate::heap_sort;
 use crate::loads::LoadError;
 use crate::pressure::{PressedTriangle, Pressure, SurfacePressure};
 
@@ -87,6 +88,10 @@ pub unsafe extern "C" fn supple_pressure_init(
         let mut arrays = place.arrays::<supple_pressure>();
         let room = arrays.change::<PressedTriangle>(count as usize);
         room.iter_mut().zip(made().flatten()).for_each(|(place, triangle)| *place = triangle);
+        // Each change of the surface costs a sum over its triangles. An order that the host has chosen stays.
+        if !room.is_sorted_by_key(|triangle| triangle.surface()) {
+            heap_sort::sort(room, |triangle| (triangle.surface(), triangle.nodes()));
+        }
         arrays.change::<SurfacePressure>(surfaces as usize).fill(SurfacePressure::default());
         let nodes = nodes as u32;
         pressure.write(place.put(|head| supple_pressure { head, nodes, triangles: count, surfaces }));

@@ -777,6 +777,18 @@ static void pressures_and_rest(void) {
     REFUSED(SUPPLE_E_INDEX, PRESSED(memory, bytes, faces[0], NULL, 1));
     CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
     faces[1][2] = last;
+    /* Surfaces that are mixed, in whichever way, come to the same. */
+    static uint32_t mixed[4 * TETS][3], of_mixed[4 * TETS];
+    uint64_t sums[2];
+    for (uint32_t way = 0; way < 2; way++) {
+        for (uint32_t n = 0; n < count; n++) {
+            const uint32_t at = way == 0 ? n : count - 1 - n;
+            memcpy(mixed[n], faces[at], sizeof mixed[n]), of_mixed[n] = at % 2;
+        }
+        DONE(supple_pressure_init(memory, bytes, scene, points[0], mixed[0], of_mixed, count, 2, &pressure, &error));
+        sums[way] = hash(memory, bytes);
+    }
+    CHECK(sums[0] == sums[1]);
     DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[0], surface_of, count, 2, &pressure, &error));
     REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_set(pressure, 0, NAN, 0.0f));
     REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_set(pressure, 0, 1.0f, -1.0f));
