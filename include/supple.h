@@ -52,6 +52,8 @@
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
     (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
+#define SUPPLE_PULLS_SIZE(pulls, nodes) \
+    (SUPPLE_PULLS_FRONT + SUPPLE_ARRAY_(nodes, 8) + SUPPLE_ARRAY_(pulls, 80) + SUPPLE_ARRAY_(pulls, 16))
 #define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
@@ -166,6 +168,11 @@
  * Most parts of a step.
  */
 #define SUPPLE_MOST_PARTS 8
+
+/**
+ * Bytes before the arrays of pulls.
+ */
+#define SUPPLE_PULLS_FRONT 64
 
 /**
  * At a place of the shape at rest: where its material is now, less where it was.
@@ -1980,9 +1987,10 @@ supple_status supple_own_threads(uint32_t parts,
 #endif
 
 /**
- * Bytes of memory that so many pulls need, of so many nodes in sum.
+ * Bytes of memory that so many pulls need, of so many nodes in sum. SUPPLE_PULLS_SIZE is the same as a constant.
  */
-size_t supple_pulls_size(uint32_t pulls, uint32_t nodes);
+size_t supple_pulls_size(uint32_t pulls,
+                         uint32_t nodes);
 
 /**
  * Prepares room for pulls in `memory` of at least supple_pulls_size bytes, aligned to SUPPLE_ALIGN: none yet.

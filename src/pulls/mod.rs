@@ -62,15 +62,26 @@ pub struct Pull {
     pub along: [f32; 3],
     /// The target at the first of the times, m.
     pub from: [f32; 3],
-    /// At the second.
+    /// At the second; with a first coordinate that is NaN there is none, and the pull is absent.
     pub to: [f32; 3],
     /// s. Between these times the target moves evenly, before and after it stands still.
     pub times: [f64; 2],
 }
 
+/// Lets pulls let go of nodes that belong to no element of the scene any more; those that have no other ones are absent.
+pub(crate) fn let_go_of_removed<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode], pulls: &mut [Pull]) {
+    for pull in pulls {
+        let [first, count] = pull.nodes.map(|number| number as usize);
+        let own = nodes.get_mut(first..).and_then(|nodes| nodes.get_mut(..count));
+        if !let_go(scene, own.unwrap_or_default()) {
+            pull.stiffness = 0.0;
+        }
+    }
+}
+
 /// Shares a pull among those of its nodes that still belong to an element of the scene. Whether there are any: else it has
 /// nothing to pull.
-pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
+pub(crate) fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
     let is_left = |node: u32| !scene.is_alone(node as usize);
     if nodes.iter().all(|pulled| is_left(pulled.node)) {
         return true;
@@ -91,7 +102,7 @@ pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
 pub struct Pulled {
     /// m.
     pub point: [f32; 3],
-    /// From the point to the target, m; along the direction of a pull that has one.
+    /// From the point to the target, m; along the direction of a pull that has one; zero of one that is absent.
     pub gap: [f32; 3],
     /// On the tissue, N.
     pub force: [f32; 3],
@@ -104,9 +115,16 @@ impl Pull {
         Self { nodes, at, stiffness, most: f32::INFINITY, along: [0.0; 3], from: at, to: at, times: [0.0; 2] }
     }
 
-    /// The target moves, from where it is at the time `from` (s), to `target` (m) at the time `to`.
+    /// Whether it acts.
+    const fn acts(&self) -> bool {
+        self.stiffness > 0.0 && !self.to[0].is_nan()
+    }
+
+    /// The target moves, from where it is at the time `from` (s), to `target` (m) at the time `to`; of a pull that is
+    /// absent, or is to be, it is there at once.
     pub fn move_to(&mut self, target: [f32; 3], from: f64, to: f64) {
-        self.from = self.target(from).to_array();
+        let is_there = self.acts() && !target[0].is_nan();
+        self.from = if is_there { self.target(from).to_array() } else { target };
         (self.to, self.times) = (target, [from, to]);
     }
 
@@ -156,7 +174,7 @@ impl Pull {
             return Err(PullError::Range { pull: index, first, count, nodes });
         }
         let vectors = [("point", self.at), ("direction", self.along), ("target", self.from), ("target", self.to)];
-        for (what, vector) in vectors {
+        for (what, vector) in vectors.into_iter().take(if self.to[0].is_nan() { 2 } else { 4 }) {
             if let Some(&value) = vector.iter().find(|component| !is_bounded(**component)) {
                 return Err(PullError::Value { pull: index, what, value });
             }
@@ -240,7 +258,7 @@ impl<'a> Pulls<'a> {
 
     /// Those that act now, and their places.
     pub(crate) fn acting(&self) -> impl Iterator<Item = (usize, &'a Pull)> + use<'a> {
-        self.pulls.iter().enumerate().filter(|(_, pull)| pull.stiffness > 0.0)
+        self.pulls.iter().enumerate().filter(|(_, pull)| pull.acts())
     }
 
     /// The nodes of a pull.
@@ -256,7 +274,7 @@ impl<'a> Pulls<'a> {
         let pull = self.pulls.get(index)?;
         let moved = self.mean(pull, |node| displacements.get(node).copied().unwrap_or_default().to_array().into());
         let at = Vec3::from_array(pull.at);
-        let gap = pull.gap((pull.target(time) - at) - moved);
+        let gap = if pull.acts() { pull.gap((pull.target(time) - at) - moved) } else { Vec3::ZERO };
         let force = forces.get(index).copied().unwrap_or_default().to_array();
         Some(Pulled { point: (at + moved).to_array(), gap: gap.to_array(), force })
     }
