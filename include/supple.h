@@ -52,6 +52,8 @@
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
     (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
+#define SUPPLE_PULLS_SIZE(pulls, nodes) \
+    (SUPPLE_PULLS_FRONT + SUPPLE_ARRAY_(nodes, 8) + SUPPLE_ARRAY_(pulls, 80) + SUPPLE_ARRAY_(pulls, 16))
 #define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
@@ -166,6 +168,11 @@
  * Most parts of a step.
  */
 #define SUPPLE_MOST_PARTS 8
+
+/**
+ * Bytes before the arrays of pulls.
+ */
+#define SUPPLE_PULLS_FRONT 64
 
 /**
  * At a place of the shape at rest: where its material is now, less where it was.
@@ -302,10 +309,16 @@
 #define SUPPLE_REMARK_THIN 12
 
 /**
+ * All nodes of pull `index` are held: it moves nothing.
+ */
+#define SUPPLE_REMARK_HELD_PULL 13
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
- * afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
- * supple_learned_step says of a refused one. Numbers are never given another meaning.
+ * afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large
+ * keeps the inertia that a refused step had computed for other pulls, and what supple_learned_step says of a refused
+ * one. Numbers are never given another meaning.
  */
 enum supple_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -383,7 +396,7 @@ enum supple_status
      */
     SUPPLE_E_INDEX = -10,
     /**
-     * Entry or node `index` has a number (value) that is NaN or infinite.
+     * Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of a pressed point beyond 1e6 m.
      */
     SUPPLE_E_NOT_FINITE = -11,
     /**
@@ -1934,7 +1947,7 @@ supple_status supple_set_pressure(supple_loads *loads,
 
 /**
  * Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
- * on it at its time, with what fills it.
+ * on it at its time, with what fills it. SUPPLE_E_NOT_FINITE where nodes are so far away that this is no number.
  *
  * @param cubic_metres may be NULL; receives the volume, m^3.
  * @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
@@ -1974,9 +1987,10 @@ supple_status supple_own_threads(uint32_t parts,
 #endif
 
 /**
- * Bytes of memory that so many pulls need, of so many nodes in sum.
+ * Bytes of memory that so many pulls need, of so many nodes in sum. SUPPLE_PULLS_SIZE is the same as a constant.
  */
-size_t supple_pulls_size(uint32_t pulls, uint32_t nodes);
+size_t supple_pulls_size(uint32_t pulls,
+                         uint32_t nodes);
 
 /**
  * Prepares room for pulls in `memory` of at least supple_pulls_size bytes, aligned to SUPPLE_ALIGN: none yet.
@@ -2040,6 +2054,7 @@ supple_status supple_set_targets(supple_pulls *pulls,
 
 /**
  * Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.
+ * SUPPLE_E_NOT_FINITE where nodes are so far away that one of these is no number.
  */
 supple_status supple_read_pulls(supple_pulls *pulls,
                                 supple_state *state,

@@ -17,6 +17,9 @@ use crate::scene::AsScene;
 use crate::simd::NodeVector;
 use crate::state::StateView;
 
+/// m. No target and no pressed point is farther away: so large a number is a mistake, and what follows from it might be none.
+pub(crate) const FARTHEST: f32 = 1e6;
+
 /// A force on one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalForce {
@@ -74,7 +77,7 @@ pub enum LoadError {
         /// Nodes in the scene.
         nodes: usize,
     },
-    /// A component is NaN or infinite.
+    /// A component is NaN or infinite, or that of a pressed point beyond 1e6 m.
     NotFinite {
         /// "force", "motion", "traction", "gravity", "pressure" or "pressure triangle".
         kind: &'static str,

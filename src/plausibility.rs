@@ -2,7 +2,7 @@
 //! same, but remarked upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa),
 //! Poisson's ratio, gravity (m/s^2), forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`,
 //! the speed of shear waves at rest in the softest tissue), supports counted from one, a network that learned
-//! another tissue, and instruments that pass between the nodes that they can touch.
+//! another tissue, instruments that pass between the nodes that they can touch, and pulls of held nodes.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -15,6 +15,7 @@ use crate::loads::{Motion, NodalForce};
 use crate::material::{AnyLaw, Law, Laws, Material, Moduli, Tissue};
 use crate::mesh::faces;
 use crate::mlp::Recipe;
+use crate::pulls::Pulls;
 use crate::scene::SceneView;
 
 /// Diagonals of bodies, m.
@@ -81,6 +82,8 @@ pub enum Remark {
     OtherTissue,
     /// An instrument of this thickness, m, that can touch nodes only, where the surface has longer edges.
     Thin(f32),
+    /// A pull all of whose nodes are held where it would move them.
+    HeldPull,
 }
 
 impl fmt::Display for Remark {
@@ -133,6 +136,7 @@ impl fmt::Display for Remark {
                 "an instrument is {:.2} mm thick, and edges of the surface are longer: it needs the surface's triangles",
                 1e3 * thickness
             ),
+            Self::HeldPull => f.write_str("all nodes of a pull are held: it moves nothing"),
         }
     }
 }
@@ -300,6 +304,25 @@ pub fn of_contact<M: ElementMaterial>(
     }
 }
 
+/// Of a pull along a direction (zeros: along all) on nodes with these held axes.
+#[must_use]
+pub fn of_pull(held: impl Iterator<Item = Axes>, along: [f32; 3]) -> Option<Remark> {
+    let pulls = |axis: usize| along == [0.0; 3] || along.get(axis).is_some_and(|component| *component != 0.0);
+    let is_held = |axes: Axes| (0..3).all(|axis| axes.has(axis) || !pulls(axis));
+    let (mut nodes, mut all) = (0, true);
+    held.for_each(|axes| (nodes, all) = (nodes + 1, all && is_held(axes)));
+    (all && nodes > 0).then_some(Remark::HeldPull)
+}
+
+/// Calls `say` with a remark and the number of each pull that moves nothing.
+pub fn of_pulls<M>(scene: SceneView<'_, M>, pulls: &Pulls<'_>, mut say: impl FnMut(usize, Remark)) {
+    for (index, pull) in pulls.pulls().iter().enumerate() {
+        let held = pulls.nodes_of(pull).iter().filter(|pulled| pulled.weight != 0.0);
+        let held = held.map(|pulled| scene.held(pulled.node as usize));
+        of_pull(held, pull.along).into_iter().for_each(|remark| say(index, remark));
+    }
+}
+
 /// Whether two values differ by no more than by how a person may write them.
 #[must_use]
 pub fn same(a: f32, b: f32) -> bool {
@@ -348,6 +371,16 @@ mod tests {
         let mut all = Vec::new();
         of_body(scene.view(), points, |_, remark| all.push(remark));
         all
+    }
+
+    #[test]
+    fn a_pull_of_held_nodes_is_named() {
+        let (free, all) = ([0.0; 3], [Axes::XYZ, Axes::XYZ]);
+        assert_eq!(of_pull(all.into_iter(), free), Some(Remark::HeldPull));
+        assert_eq!(of_pull([Axes::XYZ, Axes::X].into_iter(), free), None);
+        assert_eq!(of_pull([Axes::XYZ, Axes::X].into_iter(), [2.0, 0.0, 0.0]), Some(Remark::HeldPull));
+        assert_eq!(of_pull([Axes::XYZ, Axes::X].into_iter(), [2.0, 1.0, 0.0]), None);
+        assert_eq!(of_pull([].into_iter(), free), None);
     }
 
     #[test]

@@ -27,7 +27,7 @@ use glam::Vec3;
 
 #[cfg(any(feature = "std", test))]
 use crate::loads::Loads;
-use crate::loads::{LoadError, ramp_factor};
+use crate::loads::{FARTHEST, LoadError, ramp_factor};
 use crate::scene::AsScene;
 use crate::simd::NodeVector;
 
@@ -70,11 +70,18 @@ impl PressedTriangle {
         let [a, b, c] = nodes;
         let (a, b, c) = (corner(a)?, corner(b)?, corner(c)?);
         let edges = [b - a, c - a].map(|edge| edge.to_array());
-        let value = [a, b, c].into_iter().flat_map(|point| point.to_array()).find(|value| !value.is_finite());
+        let mut values = [a, b, c].into_iter().flat_map(|point| point.to_array());
+        let value = values.find(|value| value.is_nan() || value.abs() > FARTHEST);
         match value {
             Some(value) => Err(LoadError::NotFinite { kind: "pressure triangle", index, value }),
             None => Ok(Self { nodes, surface, corner: a.to_array(), edges }),
         }
+    }
+
+    /// Its surface.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn surface(&self) -> u32 {
+        self.surface
     }
 
     /// Its nodes.
@@ -132,7 +139,8 @@ pub struct Pressure<'a> {
 }
 
 impl<'a> Pressure<'a> {
-    /// Checks triangles and the pressures of their surfaces against the scene they will act on.
+    /// Checks triangles and the pressures of their surfaces against the scene they will act on. The triangles of a surface
+    /// that fills should stand together: each change of the surface from one to the next costs a sum over all.
     pub fn new(
         scene: &impl AsScene,
         triangles: &'a [PressedTriangle],
@@ -192,7 +200,8 @@ impl<'a> Pressure<'a> {
             // From within: against the tissue around a cavity, outward on a body.
             all += if now < 0.0 { filling } else { -filling };
         }
-        ramp_factor(time, ramp) * all
+        // No infinity, which times a ramp that begins would be no number.
+        ramp_factor(time, ramp) * all.clamp(-f32::MAX, f32::MAX)
     }
 
     /// Calls `with` with the nodes of each triangle, the force on each of them at `time` (s), N, and its surface.

@@ -19,6 +19,13 @@ use crate::material::Element;
 use crate::scattered::scattered;
 pub use crate::simd::NodeVector;
 
+/// The velocity (m/s) of an increment (m) over a step of so many seconds; zero before the first step. A number, however short
+/// the step.
+pub(crate) fn velocity(increment: [f32; 3], seconds: f32) -> [f32; 3] {
+    let of = |component: f32| if seconds > 0.0 { (component / seconds).clamp(-f32::MAX, f32::MAX) } else { 0.0 };
+    increment.map(of)
+}
+
 /// Vectors of a node that a step moves: displacement, remainder, increment.
 pub(crate) const MOVED_VECTORS: usize = 3;
 

@@ -269,6 +269,7 @@ pub(super) unsafe fn can_take_over(
         scene.fits(object.nodes)?;
         room_for(old.forces, object.force_room)?;
         room_for(old.motions, object.motion_room)?;
+        CallPulls::of(old.pulls, scene)?;
         arrays.change_first::<NodalForce>(0, old.force_room as usize);
         let motions = arrays.change_first::<Motion>(old.motions as usize, old.motion_room as usize);
         for (index, motion) in motions.iter().enumerate() {
@@ -330,7 +331,7 @@ impl<'a> CallLoads<'a> {
             let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let contact = CallContact::of(object.contact, nodes)?;
-            let pulls = CallPulls::of(object.pulls)?;
+            let pulls = CallPulls::of(object.pulls, scene)?;
             let mut loads = Loads::unchecked(object.gravity, forces, asked, nodes);
             if !object.pressure.is_null() {
                 scene.fits(memory::read(object.pressure)?.nodes())?;

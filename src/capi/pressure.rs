@@ -2,6 +2,7 @@
 
 use core::ffi::c_void;
 
+use crate::heap_sort;
 use crate::loads::LoadError;
 use crate::pressure::{PressedTriangle, Pressure, SurfacePressure};
 
@@ -87,6 +88,10 @@ pub unsafe extern "C" fn supple_pressure_init(
         let mut arrays = place.arrays::<supple_pressure>();
         let room = arrays.change::<PressedTriangle>(count as usize);
         room.iter_mut().zip(made().flatten()).for_each(|(place, triangle)| *place = triangle);
+        // Each change of the surface costs a sum over its triangles. An order that the host has chosen stays.
+        if !room.is_sorted_by_key(|triangle| triangle.surface()) {
+            heap_sort::sort(room, |triangle| (triangle.surface(), triangle.nodes()));
+        }
         arrays.change::<SurfacePressure>(surfaces as usize).fill(SurfacePressure::default());
         let nodes = nodes as u32;
         pressure.write(place.put(|head| supple_pressure { head, nodes, triangles: count, surfaces }));
@@ -176,7 +181,7 @@ pub unsafe extern "C" fn supple_set_pressure(
 }
 
 /// Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
-/// on it at its time, with what fills it.
+/// on it at its time, with what fills it. SUPPLE_E_NOT_FINITE where nodes are so far away that this is no number.
 ///
 /// @param cubic_metres may be NULL; receives the volume, m^3.
 /// @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
@@ -197,11 +202,16 @@ pub unsafe extern "C" fn supple_pressure_now(
             return Err(mismatch(state.nodes as usize, there as usize));
         }
         let pressure = opened(pressure)?;
+        let is =
+            (pressure.volume(surface, displacement), pressure.pascal(surface, state.progress.time(), displacement));
+        if !(is.0.is_finite() && is.1.is_finite()) {
+            return Err(supple_error::from(SUPPLE_E_NOT_FINITE));
+        }
         if let Some(volume) = volume {
-            volume.write(pressure.volume(surface, displacement));
+            volume.write(is.0);
         }
         if let Some(now) = now {
-            now.write(pressure.pascal(surface, state.progress.time(), displacement));
+            now.write(is.1);
         }
         Ok(SUPPLE_OK)
     };

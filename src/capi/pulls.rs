@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::mem::take;
 
-use crate::pulls::{Pull, PullError, PulledNode, Pulls, let_go, patch, usual_most};
+use crate::pulls::{self, Pull, PullError, Pulled, PulledNode, Pulls, let_go, patch, usual_most};
 use crate::state::{NodeVector, StateView};
 
 use super::loads::supple_loads;
@@ -61,11 +61,14 @@ unsafe impl Object for supple_pulls {
     const FRONT: usize = 64;
 }
 
+/// Bytes before the arrays of pulls.
+pub const SUPPLE_PULLS_FRONT: usize = 64;
+const _: () = assert!(SUPPLE_PULLS_FRONT == <supple_pulls as Object>::FRONT);
+
 fn layout(pulls: u32, nodes: u32) -> Layout {
     Layout::of::<supple_pulls>()
         .and::<PulledNode>(nodes as usize)
         .and::<Pull>(pulls as usize)
-        .and::<f32>(pulls as usize)
         .and::<NodeVector>(pulls as usize)
 }
 
@@ -73,8 +76,6 @@ fn layout(pulls: u32, nodes: u32) -> Layout {
 struct PullArrays<'a> {
     nodes: &'a mut [PulledNode],
     pulls: &'a mut [Pull],
-    /// Stiffness of each while it has a target, N/m.
-    stiffness: &'a mut [f32],
     forces: &'a mut [NodeVector],
 }
 
@@ -88,14 +89,13 @@ impl supple_pulls {
             PullArrays {
                 nodes: arrays.change(self.node_room as usize),
                 pulls: arrays.change(pulls),
-                stiffness: arrays.change(pulls),
                 forces: arrays.change(pulls),
             }
         }
     }
 }
 
-/// Bytes of memory that so many pulls need, of so many nodes in sum.
+/// Bytes of memory that so many pulls need, of so many nodes in sum. SUPPLE_PULLS_SIZE is the same as a constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_pulls_size(pulls: u32, nodes: u32) -> usize {
     layout(pulls, nodes).bytes()
@@ -128,7 +128,6 @@ pub unsafe extern "C" fn supple_pulls_init(
         let parts = object_of.parts(arrays);
         parts.nodes.fill(PulledNode::default());
         parts.pulls.fill(Pull::new([0; 2], [0.0; 3], 0.0));
-        parts.stiffness.fill(0.0);
         parts.forces.fill(NodeVector::ZERO);
         made.write(object);
         Ok(SUPPLE_OK)
@@ -147,14 +146,8 @@ pub(super) unsafe fn let_go_of_removed(pulls: *mut supple_pulls, scene: &OpenSce
     // SAFETY: the caller's promise.
     unsafe {
         let (object, arrays) = memory::open(pulls)?;
-        let PullArrays { nodes, pulls, stiffness, .. } = object.parts(arrays);
-        for (pull, stiffness) in pulls.iter_mut().zip(stiffness).take(object.pulls as usize) {
-            let [first, count] = pull.nodes.map(|number| number as usize);
-            let nodes = nodes.get_mut(first..).and_then(|nodes| nodes.get_mut(..count)).unwrap_or_default();
-            if !let_go(scene.view(), nodes) {
-                (pull.stiffness, *stiffness) = (0.0, 0.0);
-            }
-        }
+        let PullArrays { nodes, pulls, .. } = object.parts(arrays);
+        pulls::let_go_of_removed(scene.view(), nodes, pulls.get_mut(..object.pulls as usize).unwrap_or_default());
         Ok(())
     }
 }
@@ -240,10 +233,8 @@ fn added(
     let_go(scene.view(), nodes);
     let most = usual_most(scene.view(), nodes);
     let pull = checked(&object_pull(given, [object.nodes, count as u32], most), index, first + count)?;
-    let (Some(place), Some(stiffness)) = (parts.pulls.get_mut(index), parts.stiffness.get_mut(index)) else {
-        return Err(room_for(index + 1, object.pull_room));
-    };
-    (*place, *stiffness) = (Pull { stiffness: 0.0, ..pull }, pull.stiffness);
+    let place = parts.pulls.get_mut(index).ok_or(room_for(index + 1, object.pull_room))?;
+    *place = Pull { to: [f32::NAN; 3], ..pull };
     (object.pulls, object.nodes) = (index as u32 + 1, (first + count) as u32);
     Ok(SUPPLE_OK)
 }
@@ -293,14 +284,10 @@ pub unsafe extern "C" fn supple_set_pull(
         let (given, at, all) = (one(pull)?, index as usize, object.nodes as usize);
         let parts = object.parts(arrays);
         let acting = parts.pulls.get_mut(..object.pulls as usize).unwrap_or_default();
-        let (Some(place), Some(stiffness)) = (acting.get_mut(at), parts.stiffness.get_mut(at)) else {
-            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(index.into(), object.pulls.into()));
-        };
-        let Pull { stiffness: given, most, along, .. } =
-            checked(&object_pull(given, place.nodes, place.most), at, all)?;
-        let has_target = place.stiffness > 0.0;
-        (place.most, place.along, *stiffness) = (most, along, given);
-        place.stiffness = if has_target { given } else { 0.0 };
+        let missing = supple_error::from(SUPPLE_E_CAPACITY).value(index.into(), object.pulls.into());
+        let place = acting.get_mut(at).ok_or(missing)?;
+        let Pull { stiffness, most, along, .. } = checked(&object_pull(given, place.nodes, place.most), at, all)?;
+        (place.stiffness, place.most, place.along) = (stiffness, most, along);
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -328,24 +315,13 @@ pub unsafe extern "C" fn supple_set_targets(
             return Err(mismatch(count as usize, object.pulls as usize));
         }
         let (targets, all) = (array(targets.cast::<[f32; 3]>(), count as usize)?, object.nodes as usize);
-        let PullArrays { pulls, stiffness, .. } = object.parts(arrays);
-        let moved = |pull: &Pull, stiffness: f32, target: [f32; 3]| {
-            let mut moved = Pull { stiffness, ..*pull };
-            if target[0].is_nan() {
-                moved.stiffness = 0.0;
-            } else if pull.stiffness > 0.0 {
-                moved.move_to(target, from, to);
-            } else {
-                moved.put(target);
-            }
-            moved
-        };
-        for (index, ((pull, stiffness), target)) in pulls.iter().zip(&*stiffness).zip(targets).enumerate() {
-            checked(&moved(pull, *stiffness, *target), index, all)?;
+        let pulls = object.parts(arrays).pulls;
+        for (index, (&pull, target)) in pulls.iter().zip(targets).enumerate() {
+            let mut moved = pull;
+            moved.move_to(*target, from, to);
+            checked(&moved, index, all)?;
         }
-        for ((pull, stiffness), target) in pulls.iter_mut().zip(&*stiffness).zip(targets) {
-            *pull = moved(pull, *stiffness, *target);
-        }
+        pulls.iter_mut().zip(targets).for_each(|(pull, target)| pull.move_to(*target, from, to));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -353,6 +329,7 @@ pub unsafe extern "C" fn supple_set_targets(
 }
 
 /// Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.
+/// SUPPLE_E_NOT_FINITE where nodes are so far away that one of these is no number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_read_pulls(
     pulls: *mut supple_pulls,
@@ -376,11 +353,14 @@ pub unsafe extern "C" fn supple_read_pulls(
         let parts = object.parts(arrays);
         let list = parts.pulls.get(..count as usize).unwrap_or_default();
         let all = Pulls::unchecked(object.scene_nodes as usize, parts.nodes, list);
-        for (index, pull) in list.iter().enumerate() {
-            let Some(read) = all.read(index, state.displacements(), parts.forces, state.time()) else { continue };
-            let is_absent = pull.stiffness == 0.0;
-            let gap = if is_absent { [0.0; 3] } else { read.gap };
-            pulled.add(index).write(supple_pulled { point: read.point, gap, force: read.force });
+        let read =
+            || (0..list.len()).filter_map(|index| all.read(index, state.displacements(), parts.forces, state.time()));
+        let is_finite = |vectors: [[f32; 3]; 3]| vectors.as_flattened().iter().all(|value| value.is_finite());
+        if let Some(index) = read().position(|Pulled { point, gap, force }| !is_finite([point, gap, force])) {
+            return Err(supple_error::from(SUPPLE_E_NOT_FINITE).at(index));
+        }
+        for (index, Pulled { point, gap, force }) in read().enumerate() {
+            pulled.add(index).write(supple_pulled { point, gap, force });
         }
         Ok(SUPPLE_OK)
     };
@@ -422,12 +402,13 @@ impl<'a> CallPulls<'a> {
     ///
     /// # Safety
     /// As at [`memory::change`].
-    pub(super) unsafe fn of(pulls: *mut supple_pulls) -> Answer<Option<Self>> {
+    pub(super) unsafe fn of(pulls: *mut supple_pulls, scene: &OpenScene<'_>) -> Answer<Option<Self>> {
         if pulls.is_null() || !cfg!(feature = "contact") {
             return Ok(None);
         }
         // SAFETY: the caller's promise.
         let (object, arrays) = unsafe { memory::open(pulls)? };
+        scene.fits(object.scene_nodes)?;
         // SAFETY: as above.
         let PullArrays { nodes, pulls, forces, .. } = unsafe { object.parts(arrays) };
         let pulls = pulls.get(..object.pulls as usize).unwrap_or_default();

@@ -38,6 +38,8 @@ pub const SUPPLE_REMARK_OTHER_TISSUE: u32 = 11;
 /// Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels
 /// too little. Give supple_surface its triangles.
 pub const SUPPLE_REMARK_THIN: u32 = 12;
+/// All nodes of pull `index` are held: it moves nothing.
+pub const SUPPLE_REMARK_HELD_PULL: u32 = 13;
 
 /// What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
 #[repr(C)]
@@ -68,6 +70,7 @@ impl supple_remark {
             Remark::CountedFromOne => (SUPPLE_REMARK_COUNTED_FROM_ONE, SUPPLE_NONE, 0.0, 0.0),
             Remark::OtherTissue => (SUPPLE_REMARK_OTHER_TISSUE, SUPPLE_NONE, 0.0, 0.0),
             Remark::Thin(thickness) => (SUPPLE_REMARK_THIN, index, thickness as f64, 0.0),
+            Remark::HeldPull => (SUPPLE_REMARK_HELD_PULL, index, 0.0, 0.0),
         };
         Self { kind, index, value, limit }
     }
@@ -118,6 +121,9 @@ pub unsafe extern "C" fn supple_remarks(
         if let Some(touching) = &loads.contact {
             plausibility::of_contact(scene, points, &touching.contact, &mut say);
         }
+        if let Some(pulls) = asked.pulls() {
+            plausibility::of_pulls(scene, pulls, &mut say);
+        }
         let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
         network.into_iter().for_each(|remark| say(0, remark));
         count.write(told);
@@ -146,6 +152,7 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
         SUPPLE_REMARK_THIN => {
             c"an instrument thinner than edges of the surface are long: it needs the surface's triangles"
         }
+        SUPPLE_REMARK_HELD_PULL => c"a pull all of whose nodes are held: it moves nothing",
         _ => c"?",
     };
     text.as_ptr()

@@ -17,8 +17,9 @@ use super::SUPPLE_NONE;
 
 /// What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
 /// done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
-/// afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
-/// supple_learned_step says of a refused one. Numbers are never given another meaning.
+/// afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large
+/// keeps the inertia that a refused step had computed for other pulls, and what supple_learned_step says of a refused
+/// one. Numbers are never given another meaning.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
@@ -62,7 +63,7 @@ pub enum supple_status {
     /// Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit:
     /// nodes).
     SUPPLE_E_INDEX = -10,
-    /// Entry or node `index` has a number (value) that is NaN or infinite.
+    /// Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of a pressed point beyond 1e6 m.
     SUPPLE_E_NOT_FINITE = -11,
     /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s); or a
     /// tolerance (m); or a span of supple_sim_advance (s), which must be above zero.

@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 
-use crate::state::NodeVector;
+use crate::state::{NodeVector, velocity};
 
 use super::memory::{self, array, place_for};
 use super::state::{supple_state, vectors};
@@ -94,9 +94,7 @@ pub unsafe extern "C" fn supple_copy_velocities(
     let copy = || unsafe {
         let [_, _, increments, _] = vectors(state)?;
         let seconds = (*state).progress.last_step();
-        copy(state, increments, out, floats, |_, increment| {
-            if seconds > 0.0 { increment.map(|component| component / seconds) } else { [0.0; 3] }
-        })
+        copy(state, increments, out, floats, |_, increment| velocity(increment, seconds))
     };
     status_of(copy())
 }

@@ -54,7 +54,21 @@ impl<'a> Instrument<'a> {
     /// Where it is at `time`, s.
     pub(super) fn placement(&self, time: f64) -> Placement {
         let [start, end] = self.times;
-        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).max(0.0) };
+        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).clamp(0.0, 1.0) };
         Placement::between(&self.from, &self.to, share as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_stays_on_its_way_where_the_host_has_mistaken_the_times() {
+        let mut ball = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([0.0; 3]));
+        ball.move_to(Pose::at([1.0; 3]), 2.0, 1.0);
+        for time in [0.0, 0.5, 1.0, 1.5, 3.0] {
+            assert!((0.0..=1.0).contains(&ball.placement(time).position.x), "{time}");
+        }
     }
 }

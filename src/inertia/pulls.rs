@@ -132,17 +132,18 @@ pub(super) struct PullsInUse {
     of_functions: FunctionStiffness,
     /// Whether there is any.
     pub(super) any: bool,
-    /// Steps since which it is too large.
-    steps: u32,
+    /// Steps since which it is too large, and the same once this step is taken.
+    steps: [u32; 2],
 }
 
 impl PullsInUse {
-    pub(super) const NONE: Self = Self { of_functions: [0.0; _], any: false, steps: 0 };
+    pub(super) const NONE: Self = Self { of_functions: [0.0; _], any: false, steps: [0; 2] };
 
     /// Whether `S` has to be computed anew for the pulls that act now. In the function's own stack, which is free elsewhere.
     #[inline(never)]
     pub(super) fn follow(&mut self, pulls: Option<&Pulls<'_>>, lattice: &Lattice, places: &[LatticeNode]) -> bool {
         if pulls.is_none() && !self.any {
+            self.steps[1] = 0;
             return false;
         }
         let mut now = [0.0; _];
@@ -158,13 +159,18 @@ impl PullsInUse {
         let mut pairs = self.of_functions.iter().zip(now);
         let is_small = pairs.clone().any(|(used, now)| *now > GROWTH * used);
         let is_large = !is_small && pairs.any(|(used, now)| *used > GROWTH * now);
-        self.steps = if is_large { self.steps + 1 } else { 0 };
-        let is_outdated = is_small || self.steps > MOST_STEPS;
+        self.steps[1] = if is_large { self.steps[0] + 1 } else { 0 };
+        let is_outdated = is_small || self.steps[1] > MOST_STEPS;
         if is_outdated {
             self.any = now.iter().any(|stiffness| *stiffness > 0.0);
-            (self.of_functions, self.steps) = (*now, 0);
+            (self.of_functions, self.steps) = (*now, [0; 2]);
         }
         is_outdated
+    }
+
+    /// The step is taken.
+    pub(super) const fn enter(&mut self) {
+        self.steps[0] = self.steps[1];
     }
 
     /// Adds to `S`, with the weight `s_c D^2 / 4` (s^2) of stiffness.
@@ -177,5 +183,25 @@ impl PullsInUse {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_that_are_not_taken_do_not_count() {
+        let (mut pulls, none, mut some) = (PullsInUse::NONE, [0.0; _], [0.0; _]);
+        some[3] = 100.0;
+        assert!(pulls.note(&some) && pulls.any);
+        for _ in 0..3 * MOST_STEPS {
+            assert!(!pulls.note(&none));
+        }
+        for _ in 0..MOST_STEPS {
+            assert!(!pulls.note(&none));
+            pulls.enter();
+        }
+        assert!(pulls.note(&none) && !pulls.any);
     }
 }

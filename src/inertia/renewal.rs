@@ -122,6 +122,7 @@ impl Renewal {
 
     /// Enters the lattice's part of a step's increments, m.
     pub(super) fn enter(&mut self, increments: &CoarseVectors, lattice: &Lattice, frames: &Frames<'_>) {
+        self.pulls.enter();
         for (sum, increment) in self.moved.iter_mut().zip(increments) {
             sum.0 = (Vec4::from(sum.0) + Vec4::from(increment.0)).to_array();
         }

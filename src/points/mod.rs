@@ -35,7 +35,7 @@ use core::fmt;
 
 use crate::mesh::{Mesh, MeshError};
 use crate::simd::NodeVector;
-use crate::state::AsState;
+use crate::state::{AsState, velocity};
 use tree::Tree;
 
 /// A point and the element that it follows. 13 words, which may be copied and kept as bytes.
@@ -60,7 +60,7 @@ pub struct FollowedPoint {
 pub enum PointError {
     /// The mesh that they are in.
     Mesh(MeshError),
-    /// A coordinate or a weight is NaN or infinite.
+    /// A coordinate is NaN or infinite, or a weight is not from 0 to 1.
     NotFinite {
         /// The point.
         index: usize,
@@ -92,7 +92,10 @@ impl fmt::Display for PointError {
         match *self {
             Self::Mesh(error) => error.fmt(f),
             Self::NotFinite { index, axis, value } => {
-                write!(f, "point {index}: number {axis} is {value}, it must be finite: leave the point out")
+                write!(
+                    f,
+                    "point {index}: number {axis} is {value}, it must be finite, a weight from 0 to 1: leave the point out"
+                )
             }
             Self::Node { index, node, nodes } => {
                 write!(f, "point {index}: node {node} does not exist, there are {nodes} nodes: locate it in this mesh")
@@ -167,16 +170,16 @@ pub(crate) fn check_places(places: &[[f32; 3]]) -> Result<(), PointError> {
     Ok(())
 }
 
-/// That all points follow nodes of a state of so many, by weights that are numbers.
+/// That all points follow nodes of a state of so many, by weights from 0 to 1.
 pub(crate) fn check(points: &[FollowedPoint], nodes: usize) -> Result<(), PointError> {
     for (index, point) in points.iter().enumerate() {
         if let Some(&node) = point.nodes.iter().find(|&&node| node as usize >= nodes) {
             return Err(PointError::Node { index, node, nodes });
         }
-        for numbers in [&point.rest[..], &point.weights[..]] {
-            if let Some((axis, &value)) = numbers.iter().enumerate().find(|(_, number)| !number.is_finite()) {
-                return Err(PointError::NotFinite { index, axis, value });
-            }
+        let rest = point.rest.into_iter().map(|number| (number, number.is_finite())).enumerate();
+        let weights = point.weights.into_iter().map(|number| (number, (0.0..=1.0).contains(&number))).enumerate();
+        if let Some((axis, (value, _))) = rest.chain(weights).find(|(_, (_, is_good))| !is_good) {
+            return Err(PointError::NotFinite { index, axis, value });
         }
     }
     Ok(())
@@ -191,7 +194,8 @@ pub(crate) fn write_positions(points: &[FollowedPoint], displacements: &[NodeVec
     for (out, point) in out.iter_mut().zip(points) {
         let moved = point.mean(displacements);
         for axis in 0..3 {
-            out[axis] = point.rest[axis] + moved[axis];
+            // A number, however far away it is.
+            out[axis] = (point.rest[axis] + moved[axis]).clamp(-f32::MAX, f32::MAX);
         }
     }
 }
@@ -204,8 +208,7 @@ pub(crate) fn write_velocities(
     out: &mut [[f32; 3]],
 ) {
     for (out, point) in out.iter_mut().zip(points) {
-        let increment = point.mean(increments);
-        *out = if seconds > 0.0 { increment.map(|component| component / seconds) } else { [0.0; 3] };
+        *out = velocity(point.mean(increments), seconds);
     }
 }
 

@@ -77,7 +77,10 @@ fn what_cannot_be_is_refused_in_words() {
     with_bar(|mesh| {
         let words = |error: PointError| std::format!("{error}");
         let refused = VecPoints::locate(mesh, &[[0.0; 3], [0.0, f32::NAN, 0.0]]).unwrap_err();
-        assert_eq!(words(refused), "point 1: number 1 is NaN, it must be finite: leave the point out");
+        assert_eq!(
+            words(refused),
+            "point 1: number 1 is NaN, it must be finite, a weight from 0 to 1: leave the point out"
+        );
         let mut points = [FollowedPoint::default(); 1];
         let needed = words_for(mesh.element_count());
         let short = locate(mesh, &[[0.0; 3]], &mut std::vec![0; needed - 1], &mut points);

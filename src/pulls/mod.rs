@@ -30,6 +30,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::loads::FARTHEST;
 use crate::material::{Material, Moduli};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -61,21 +62,32 @@ pub struct Pull {
     pub along: [f32; 3],
     /// The target at the first of the times, m.
     pub from: [f32; 3],
-    /// At the second.
+    /// At the second; with a first coordinate that is NaN there is none, and the pull is absent.
     pub to: [f32; 3],
     /// s. Between these times the target moves evenly, before and after it stands still.
     pub times: [f64; 2],
 }
 
+/// Lets pulls let go of nodes that belong to no element of the scene any more; those that have no other ones are absent.
+pub(crate) fn let_go_of_removed<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode], pulls: &mut [Pull]) {
+    for pull in pulls {
+        let [first, count] = pull.nodes.map(|number| number as usize);
+        let own = nodes.get_mut(first..).and_then(|nodes| nodes.get_mut(..count));
+        if !let_go(scene, own.unwrap_or_default()) {
+            pull.stiffness = 0.0;
+        }
+    }
+}
+
 /// Shares a pull among those of its nodes that still belong to an element of the scene. Whether there are any: else it has
 /// nothing to pull.
-pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
+pub(crate) fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
     let is_left = |node: u32| !scene.is_alone(node as usize);
     if nodes.iter().all(|pulled| is_left(pulled.node)) {
         return true;
     }
     let left: f32 = nodes.iter().filter(|pulled| is_left(pulled.node)).map(|pulled| pulled.weight).sum();
-    if left <= 0.0 {
+    if left < LEAST_WEIGHT {
         return false;
     }
     for pulled in nodes {
@@ -90,7 +102,7 @@ pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
 pub struct Pulled {
     /// m.
     pub point: [f32; 3],
-    /// From the point to the target, m; along the direction of a pull that has one.
+    /// From the point to the target, m; along the direction of a pull that has one; zero of one that is absent.
     pub gap: [f32; 3],
     /// On the tissue, N.
     pub force: [f32; 3],
@@ -103,9 +115,16 @@ impl Pull {
         Self { nodes, at, stiffness, most: f32::INFINITY, along: [0.0; 3], from: at, to: at, times: [0.0; 2] }
     }
 
-    /// The target moves, from where it is at the time `from` (s), to `target` (m) at the time `to`.
+    /// Whether it acts.
+    const fn acts(&self) -> bool {
+        self.stiffness > 0.0 && !self.to[0].is_nan()
+    }
+
+    /// The target moves, from where it is at the time `from` (s), to `target` (m) at the time `to`; of a pull that is
+    /// absent, or is to be, it is there at once.
     pub fn move_to(&mut self, target: [f32; 3], from: f64, to: f64) {
-        self.from = self.target(from).to_array();
+        let is_there = self.acts() && !target[0].is_nan();
+        self.from = if is_there { self.target(from).to_array() } else { target };
         (self.to, self.times) = (target, [from, to]);
     }
 
@@ -121,7 +140,7 @@ impl Pull {
         if time >= end {
             return self.to.into();
         }
-        let share = ((time - start) / (end - start)).max(0.0) as f32;
+        let share = ((time - start) / (end - start)).clamp(0.0, 1.0) as f32;
         let [from, to] = [self.from, self.to].map(Vec3::from_array);
         from + share * (to - from)
     }
@@ -155,8 +174,8 @@ impl Pull {
             return Err(PullError::Range { pull: index, first, count, nodes });
         }
         let vectors = [("point", self.at), ("direction", self.along), ("target", self.from), ("target", self.to)];
-        for (what, vector) in vectors {
-            if let Some(&value) = vector.iter().find(|component| !component.is_finite()) {
+        for (what, vector) in vectors.into_iter().take(if self.to[0].is_nan() { 2 } else { 4 }) {
+            if let Some(&value) = vector.iter().find(|component| !is_bounded(**component)) {
                 return Err(PullError::Value { pull: index, what, value });
             }
         }
@@ -184,6 +203,14 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
     0.75 * Moduli::of(&tissue.law).shear as f32 * edge * edge
 }
 
+/// Whether a coordinate (m) or a weight is one.
+fn is_bounded(value: f32) -> bool {
+    value.abs() <= FARTHEST
+}
+
+/// Below this sum of weights nothing is left of a pull.
+const LEAST_WEIGHT: f32 = 1e-6;
+
 /// The stiffest pull, N/m.
 pub const MOST_STIFFNESS: f32 = 1e6;
 
@@ -202,7 +229,7 @@ impl<'a> Pulls<'a> {
             if pulled.node as usize >= scene_nodes {
                 return Err(PullError::Node { index, node: pulled.node, nodes: scene_nodes });
             }
-            if !pulled.weight.is_finite() {
+            if !is_bounded(pulled.weight) {
                 return Err(PullError::Weight { index, value: pulled.weight });
             }
         }
@@ -231,7 +258,7 @@ impl<'a> Pulls<'a> {
 
     /// Those that act now, and their places.
     pub(crate) fn acting(&self) -> impl Iterator<Item = (usize, &'a Pull)> + use<'a> {
-        self.pulls.iter().enumerate().filter(|(_, pull)| pull.stiffness > 0.0)
+        self.pulls.iter().enumerate().filter(|(_, pull)| pull.acts())
     }
 
     /// The nodes of a pull.
@@ -247,7 +274,7 @@ impl<'a> Pulls<'a> {
         let pull = self.pulls.get(index)?;
         let moved = self.mean(pull, |node| displacements.get(node).copied().unwrap_or_default().to_array().into());
         let at = Vec3::from_array(pull.at);
-        let gap = pull.gap((pull.target(time) - at) - moved);
+        let gap = if pull.acts() { pull.gap((pull.target(time) - at) - moved) } else { Vec3::ZERO };
         let force = forces.get(index).copied().unwrap_or_default().to_array();
         Some(Pulled { point: (at + moved).to_array(), gap: gap.to_array(), force })
     }
@@ -271,7 +298,7 @@ pub enum PullError {
         /// Nodes of the scene.
         nodes: usize,
     },
-    /// A weight is not a finite number.
+    /// A weight is not a number, or beyond 1e6.
     Weight {
         /// Place in the list of nodes.
         index: usize,
@@ -321,7 +348,10 @@ impl fmt::Display for PullError {
                 write!(f, "entry {index} of the pulled nodes: node {node} does not exist, the scene has {nodes} nodes")
             }
             Self::Weight { index, value } => {
-                write!(f, "entry {index} of the pulled nodes: a weight of {value}, it must be a finite number")
+                write!(
+                    f,
+                    "entry {index} of the pulled nodes: a weight of {value}, it must be a number up to {FARTHEST:e}"
+                )
             }
             Self::Range { pull, first, count, nodes } => write!(
                 f,
@@ -334,7 +364,7 @@ impl fmt::Display for PullError {
                 write!(f, "pull {pull}: a most force of {value} N, it must be zero or more, infinite for no limit")
             }
             Self::Value { pull, what, value } => {
-                write!(f, "pull {pull}: a component of its {what} is {value}, it must be a finite number")
+                write!(f, "pull {pull}: a component of its {what} is {value}, it must be a number up to {FARTHEST:e}")
             }
             Self::Nothing { radius, nearest } => write!(
                 f,
@@ -350,3 +380,21 @@ impl fmt::Display for PullError {
 }
 
 impl core::error::Error for PullError {}
+
+#[cfg(test)]
+mod tests {
+    use super::Pull;
+
+    #[test]
+    fn a_target_stays_between_where_it_was_and_where_it_goes() {
+        let mut pull = Pull::new([0, 1], [0.0; 3], 1.0);
+        // Also where the host has mistaken the times.
+        for [from, to] in [[1.0, 2.0], [2.0, 1.0], [2.0, f64::MIN_POSITIVE], [1.0, 1.0]] {
+            pull.put([0.0; 3]);
+            pull.move_to([1.0; 3], from, to);
+            for time in [0.0, 0.5, 1.0, 1.5, 3.0] {
+                assert!((0.0..=1.0).contains(&pull.target(time).x), "{from} {to} {time}");
+            }
+        }
+    }
+}

@@ -10,7 +10,7 @@ use super::owned::{Exact, Prepared};
 use super::{Simulation, SimulationError};
 use crate::material::{AnyLaw, Law, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
-use crate::pulls::let_go;
+use crate::pulls::let_go_of_removed;
 use crate::scene::BuildError;
 use crate::tled;
 
@@ -214,13 +214,7 @@ impl Simulation<'_> {
             return Ok(());
         }
         let view = self.scene.view();
-        for pull in &mut self.pulls {
-            let [first, count] = pull.nodes.map(|number| number as usize);
-            let Some(nodes) = self.pulled.get_mut(first..first + count) else { continue };
-            if !let_go(view, nodes) {
-                pull.stiffness = 0.0;
-            }
-        }
+        let_go_of_removed(view, &mut self.pulled, &mut self.pulls);
         let triangles = !self.touchable.1.is_empty();
         if self.changes.meets_boundary {
             return self.meet_boundary(triangles);

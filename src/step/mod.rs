@@ -1,7 +1,8 @@
 //! The protocol that every step follows, exact or not (`StepMethod`): begin (borrow the state, check that everything
 //! fits), compute forces and next increments, enter them in the energy balance, and only then accept the step and move
 //! the state, or refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and
-//! what a method keeps of it: the next step is the same, to the bit, as if there had been none.
+//! what a method keeps of it: the next step is the same, to the bit, as if there had been none. Only inertia that a long
+//! step has computed for other pulls than before stays.
 
 mod cause;
 mod compensated;
@@ -214,6 +215,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             Err((node, cause)) => {
                 method.refuse();
                 self.clear_touches();
+                self.pulls.fill(NodeVector::ZERO);
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }
         };

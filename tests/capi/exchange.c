@@ -1,17 +1,31 @@
 /* Tissue that changes while it moves: a simulation goes on in another one without some elements, and with other constants. What stays
  * keeps its momentum, the end is that of a body that was so from the start, and what is refused changes nothing. */
 #include "body.h"
+#ifdef UNDER_VALGRIND
+#include <valgrind/memcheck.h>
+#endif
 
-enum { ROOM = 32 << 20 };
+/* A coarse bar takes longer to rest. */
+enum { ROOM = PARTS == 1 ? 6 << 20 : 32 << 20, FRAMES = PARTS == 1 ? 400 : 150 };
 static const double FRAME = 0.02; /* s */
 
 SUPPLE_MEMORY(first_memory, ROOM);
 SUPPLE_MEMORY(second_memory, ROOM);
 SUPPLE_MEMORY(third_memory, ROOM);
 SUPPLE_MEMORY(contact_memory, 1 << 20);
+SUPPLE_MEMORY(pulls_memory, 1 << 10);
 static uint8_t removed[TETS];
 static supple_scene_config body;
 static float of_one[NODES][3], of_other[NODES][3], frozen[NODES][3];
+
+/* Of all bytes of an object. Those between its fields have no values of their own, but stay what they are. */
+static uint64_t hash_of(const unsigned char *memory) {
+    uint64_t sum = hash(memory, ROOM);
+#ifdef UNDER_VALGRIND
+    (void)VALGRIND_MAKE_MEM_DEFINED(&sum, sizeof sum);
+#endif
+    return sum;
+}
 
 static supple_settings settings_of(uint32_t steps) {
     supple_settings made;
@@ -93,10 +107,10 @@ static void elements_go(uint32_t steps, const char *name) {
 
     remove_a_part(), body.removed = removed;
     supple_sim *second = set_up(second_memory, &settings), *never = set_up(third_memory, &settings);
-    const uint64_t before = hash(first_memory, ROOM);
+    const uint64_t before = hash_of(first_memory);
     supple_error error;
     const supple_status status = supple_sim_carry_on(second, first, &settings, &error);
-    CHECK(status == SUPPLE_OK && hash(first_memory, ROOM) == before);
+    CHECK(status == SUPPLE_OK && hash_of(first_memory) == before);
     double time;
     CHECK(supple_state_time(objects_of(second).state, &time, NULL) == SUPPLE_OK && fabs(time - 10 * FRAME) < 1e-6);
     CHECK(supple_copy_displacements(objects_of(second).state, of_one[0], 3 * NODES) == SUPPLE_OK);
@@ -107,7 +121,7 @@ static void elements_go(uint32_t steps, const char *name) {
     CHECK(part.mass < whole.mass && part.elements < whole.elements && part.nodes == whole.nodes);
 
     set_gravity(never);
-    advance(second, 150), advance(never, 160);
+    advance(second, FRAMES), advance(never, FRAMES + 10);
     const double off = difference(second, never, 0);
     printf("exchange: %s steps, %u elements less, %.4f of the way off\n", name, whole.elements - part.elements, off);
     CHECK(off < most_of(steps));
@@ -180,7 +194,7 @@ static void refusals_change_nothing(void) {
     supple_error error;
     size_t bytes;
     CHECK(supple_sim_size(&body, &settings, &bytes, NULL) == SUPPLE_OK);
-    const uint64_t before = hash(first_memory, ROOM), after = hash(second_memory, ROOM);
+    const uint64_t before = hash_of(first_memory), after = hash_of(second_memory);
     CHECK(supple_sim_carry_on(NULL, first, &settings, NULL) == SUPPLE_E_NULL);
     CHECK(supple_sim_carry_on(second, NULL, &settings, NULL) == SUPPLE_E_NULL);
     CHECK(supple_sim_carry_on(second, first, NULL, NULL) == SUPPLE_E_NULL);
@@ -191,7 +205,8 @@ static void refusals_change_nothing(void) {
     CHECK(supple_sim_set_tissues(first, NULL, 1, &settings, NULL) == SUPPLE_E_NULL);
     CHECK(supple_sim_set_tissues(first, &other, 0, &settings, &error) == SUPPLE_E_MISMATCH);
     other.constants[0] = NAN;
-    CHECK(supple_sim_set_tissues(first, &other, 1, &settings, &error) == SUPPLE_E_CONSTANT && error.index == 0);
+    CHECK(supple_sim_set_tissues(first, &other, 1, &settings, &error) == SUPPLE_E_CONSTANT);
+    CHECK(error.index == 0 || (PARTS == 1 && error.index < TETS));
     CHECK(supple_set_tissues((supple_scene *)objects_of(first).scene, &other, 1, NULL) == SUPPLE_E_CONSTANT);
     CHECK(supple_set_tissues(NULL, &other, 1, NULL) == SUPPLE_E_NULL);
     other = tissue, other.density = 900.0f;
@@ -200,7 +215,17 @@ static void refusals_change_nothing(void) {
     CHECK(supple_state_carry_on(objects_of(first).scene, NULL) == SUPPLE_E_NULL);
     CHECK(supple_contact_carry_on(objects_of(first).contact, objects_of(first).scene, NULL) == SUPPLE_E_NULL);
     CHECK(supple_contact_carry_on(objects_of(first).contact, objects_of(first).scene, objects_of(first).contact) == SUPPLE_E_OVERLAP);
-    CHECK(hash(first_memory, ROOM) == before && hash(second_memory, ROOM) == after);
+    CHECK(hash_of(first_memory) == before && hash_of(second_memory) == after);
+    /* Pulls whose memory is used for something else by now. */
+    supple_pulls *pulls;
+    CHECK(supple_pulls_init(pulls_memory, sizeof pulls_memory, objects_of(first).scene, 1, 1, &pulls) == SUPPLE_OK);
+    CHECK(supple_set_pulls(objects_of(first).loads, pulls) == SUPPLE_OK);
+    memset(pulls_memory, 0, sizeof pulls_memory);
+    CHECK(supple_sim_setup(second_memory, bytes, &body, &settings, &second, NULL) == SUPPLE_OK);
+    const uint64_t without = hash_of(second_memory);
+    CHECK(supple_sim_carry_on(second, first, &settings, NULL) == SUPPLE_E_NOT_INITIALISED && hash_of(second_memory) == without);
+    CHECK(supple_set_pulls(objects_of(first).loads, NULL) == SUPPLE_OK);
+    CHECK(hash_of(first_memory) == before);
     /* Marks that are none, all of them, and another body. */
     removed[17] = 2;
     CHECK(supple_sim_setup(third_memory, bytes, &body, &settings, &none, &error) == SUPPLE_E_CHOICE && error.index == 17);
@@ -210,7 +235,7 @@ static void refusals_change_nothing(void) {
     supple_sim *moved = set_up(third_memory, &settings);
     CHECK(supple_sim_carry_on(moved, first, &settings, &error) == SUPPLE_E_MISMATCH && error.node == 5);
     points[5][0] -= 1e-5f;
-    CHECK(hash(first_memory, ROOM) == before);
+    CHECK(hash_of(first_memory) == before);
     advance(first, 1);
     /* Steps that choose their length are prepared anew. */
     const supple_settings chosen = settings_of(SUPPLE_STEPS_AUTO);

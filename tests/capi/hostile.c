@@ -1,8 +1,8 @@
 /* Random calls with arguments as no sound host makes them, within what the header allows: counts, sizes, versions, choices, nodes,
  * numbers, addresses and objects are wrong as often as right. Memory that no call may touch lies on both sides of everything, and any
  * access to it ends the program. After each call: the status is one of the header's, a refused call has changed nothing and named its
- * status, what was taken is finite, objects that were not handed over are as before; and after a refused step the next one is the
- * same, to the bit, as without it.
+ * status, what was taken or told is finite, objects that were not handed over are as before; and after a refused step the next one is
+ * the same, to the bit, as without it.
  *
  *     hostile [CALLS | SECONDSs] [SEED]
  */
@@ -72,8 +72,8 @@ static void *end_of(const arena *in, size_t bytes) {
 }
 
 /* Objects of all kinds: what a call is told to be at an address may be of any kind. */
-enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, CONTACT, SIM, KINDS };
-enum { EACH = 3, SLOTS = KINDS * EACH };
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, CONTACT, SIM, PULLS, PRESSURE, KINDS };
+enum { EACH = 3, SLOTS = KINDS * EACH, MOST_PULLS = 4, PLACES = 40, SIDE = 8 };
 static struct {
     arena in;
     unsigned char *at;
@@ -82,8 +82,9 @@ static struct {
     int written;
 } slots[SLOTS];
 static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, of_removed,
-    copies[4];
+    of_places, of_found, of_field, of_scratch, copies[2];
 static size_t weights_bytes, damper_bytes;
+static uint32_t of_bar[4 * TETS][3], bar_triangles;
 static const char *doing;
 static supple_report report;
 static supple_error error;
@@ -478,10 +479,257 @@ static void same_as_without(const supple_scene *scene, supple_state *state, supp
     }
 }
 
-/* Steps change the contact of their loads, and what is grasped moves nothing. */
+/* Steps change contact and pulls of their loads, and what is grasped moves nothing. */
 static void contacts_may_change(void) {
     for (int n = 0; n < EACH; n++) {
-        slots[CONTACT * EACH + n].written = 1;
+        slots[CONTACT * EACH + n].written = slots[PULLS * EACH + n].written = 1;
+    }
+}
+
+/* What a call wrote is finite; what a refused one was handed is as before. */
+static void told_well(supple_status status, const void *out, size_t bytes, uint64_t before) {
+    if (status < 0 && hash(out, bytes) != before) {
+        fail("a refused call has written", status);
+    }
+    for (size_t n = 0; status >= 0 && n < bytes / sizeof(float); n++) {
+        if (!isfinite(((const float *)out)[n])) {
+            fail("a number that is none is told", status);
+        }
+    }
+}
+
+static supple_status make_pulls(void) {
+    const uint32_t pulls = number(1 + below(MOST_PULLS)), nodes = number(below(2) ? 24 : NODES);
+    size_t bytes;
+    supple_pulls *made = NULL;
+    void *at = room(PULLS, supple_pulls_size(pulls, nodes), &bytes);
+    return supple_pulls_init(at, bytes, object(SCENE, 0), pulls, nodes, one_in(60) ? NULL : &made);
+}
+
+static supple_pull some_pull(void) {
+    const float *near = points[below(NODES)];
+    supple_pull made = {{0, 0, 0}, one_in(5) ? wild(0.05f) : 0.012f, powf(10.0f, (float)below(one_in(5) ? 10 : 7)), 0.0f, {0, 0, 0}};
+    for (int axis = 0; axis < 3; axis++) {
+        made.at[axis] = near[axis] + wild(0.002f), made.along[axis] = one_in(2) ? 0.0f : wild(1.0f);
+    }
+    made.stiffness = one_in(20) ? wild(1e6f) : made.stiffness, made.most = one_in(3) ? 0.0f : one_in(3) ? INFINITY : fabsf(wild(0.1f));
+    made.most = one_in(60) ? wild(1.0f) : made.most;
+    return made;
+}
+
+static supple_status add_pull(void) {
+    supple_pulls *pulls = object(PULLS, 1);
+    const supple_scene *scene = object(SCENE, 0);
+    const supple_pull pull = some_pull();
+    const supple_pull *given = one_in(60) ? NULL : &pull;
+    if (one_in(2)) {
+        return supple_add_pull(pulls, scene, points_for(nodes_of(scene)), given, wanted());
+    }
+    const uint32_t count = is_calm ? 4 : below(9);
+    uint32_t *nodes = end_of(&of_faces, 4 * count);
+    float *weights = end_of(&of_out, 4 * count);
+    for (uint32_t n = 0; n < count; n++) {
+        nodes[n] = number(below(NODES)), weights[n] = one_in(5) ? wild(1.0f) : 1.0f / (float)count;
+    }
+    return supple_add_pull_of_nodes(pulls, scene, one_in(60) ? NULL : nodes, one_in(60) ? NULL : weights, count, given, wanted());
+}
+
+/* Only the host knows how many pulls there are: all numbers are tried. */
+static supple_status move_pulls(void) {
+    supple_pulls *pulls = object(PULLS, 1);
+    float *targets = end_of(&of_out, 12 * MOST_PULLS);
+    double now = 0.0;
+    (void)supple_state_time(object(STATE, 0), &now, NULL);
+    const double from = one_in(10) ? (double)wild(1.0f) : now, to = one_in(10) ? (double)wild(1.0f) : now + 0.01 * (double)share();
+    const float far = one_in(5) ? powf(10.0f, (float)below(38)) : 0.003f;
+    for (int n = 0; n < MOST_PULLS; n++) {
+        const float *near = points[below(NODES)];
+        for (int axis = 0; axis < 3; axis++) {
+            targets[3 * n + axis] = near[axis] + wild(far);
+        }
+        targets[3 * n] = one_in(8) ? NAN : targets[3 * n];
+    }
+    supple_status status = SUPPLE_E_MISMATCH;
+    for (uint32_t count = 0; count <= MOST_PULLS && status == SUPPLE_E_MISMATCH; count++) {
+        status = supple_set_targets(pulls, one_in(60) ? NULL : targets, count, from, to, wanted());
+    }
+    return status;
+}
+
+static supple_status read_pulls(supple_pulls *pulls, supple_state *state) {
+    supple_pulled *out = end_of(&of_out, MOST_PULLS * sizeof *out);
+    supple_status status = SUPPLE_E_MISMATCH;
+    for (uint32_t count = 0; count <= MOST_PULLS && status == SUPPLE_E_MISMATCH; count++) {
+        const uint64_t before = hash(out, count * sizeof *out);
+        status = supple_read_pulls(pulls, state, one_in(60) ? NULL : out, count);
+        told_well(status, out, count * sizeof *out, before);
+    }
+    return status;
+}
+
+static supple_status pull(void) {
+    switch (below(8)) {
+        case 0:
+        case 1: return add_pull();
+        case 2: {
+            const supple_pull pull = some_pull();
+            return supple_set_pull(object(PULLS, 1), number(below(MOST_PULLS)), one_in(60) ? NULL : &pull, wanted());
+        }
+        case 3: return read_pulls(object(PULLS, 1), object(STATE, 1));
+        case 4:
+        case 5: return supple_set_pulls(object(LOADS, 1), one_in(8) ? NULL : object(PULLS, 1));
+        default: return move_pulls();
+    }
+}
+
+/* Surfaces that a host mixes, some of which are not closed. */
+static supple_status make_pressure(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    const uint32_t all = bar_triangles, count = one_in(4) ? below(all + 1) : all, surfaces = number(1 + below(3));
+    uint32_t *corners = end_of(&of_faces, 12 * (size_t)count), *surface_of = end_of(&of_found, 4 * (size_t)count);
+    memcpy(corners, of_bar, 12 * (size_t)count);
+    for (uint32_t n = 0; n < count; n++) {
+        surface_of[n] = one_in(400) ? number(0) : n % 3 < surfaces ? n % 3 : 0;
+    }
+    for (uint32_t n = below(4); n > 0 && count > 0 && one_in(5); n--) {
+        corners[below(3 * count)] = number(below(NODES));
+    }
+    size_t bytes;
+    supple_pressure *made = NULL;
+    void *at = room(PRESSURE, supple_pressure_size(count, surfaces), &bytes);
+    return supple_pressure_init(at, bytes, scene, points_for(nodes_of(scene)), one_in(60) ? NULL : corners, one_in(3) ? NULL : surface_of,
+                                count, surfaces, one_in(60) ? NULL : &made, wanted());
+}
+
+static supple_status press(void) {
+    supple_pressure *pressure = object(PRESSURE, 1);
+    const uint32_t surface = number(below(3));
+    switch (below(6)) {
+        case 0: return supple_pressure_set(pressure, surface, one_in(4) ? wild(1e4f) : 20.0f * share(), one_in(4) ? wild(0.1f) : 0.0f);
+        case 1: return supple_pressure_fill(pressure, surface, one_in(8) ? wild(1e-4f) : 6e-5f * share(), one_in(8) ? wild(1e5f) : 1e3f * share());
+        case 2:
+        case 3: return supple_set_pressure(object(LOADS, 1), one_in(8) ? NULL : pressure);
+        default: {
+            struct {
+                double volume;
+                float pascal, nothing;
+            } told = {0.0, 0.0f, 0.0f};
+            const uint64_t before = hash(&told, sizeof told);
+            const supple_status status = supple_pressure_now(pressure, object(STATE, 0), surface, one_in(60) ? NULL : &told.volume,
+                                                             one_in(60) ? NULL : &told.pascal);
+            if (!isfinite(told.volume)) {
+                fail("a volume that is no number is told", status);
+            }
+            told.volume = status < 0 ? told.volume : 0.0;
+            told_well(status, &told, sizeof told, before);
+            return status;
+        }
+    }
+}
+
+/* A mesh with a few mistakes, and points that were located in it or damaged since. */
+static supple_status points_and_fields(void) {
+    static supple_followed_point kept[PLACES];
+    const uint32_t elements = one_in(3) ? 1 + below(TETS) : TETS, nodes = one_in(20) ? below(NODES + 1) : NODES, kind = below(3);
+    if (kind == 0) {
+        const uint32_t count = below(PLACES + 1);
+        supple_followed_point *located = end_of(&of_places, count * sizeof *located);
+        for (uint32_t n = 0; n < count; n++) {
+            if (one_in(40)) {
+                ((float *)(void *)&kept[n])[below(sizeof kept[n] / 4)] = wild(1.0f);
+            } else if (one_in(40)) {
+                kept[n].nodes[below(4)] = number(below(NODES));
+            }
+            located[n] = kept[n];
+        }
+        float *positions = end_of(&of_out, 12 * (size_t)count), *fast = end_of(&of_field, 12 * (size_t)count);
+        const uint64_t before[2] = {hash(positions, 12 * (size_t)count), hash(fast, 12 * (size_t)count)};
+        float *const wanted_fast = one_in(3) ? NULL : fast;
+        const supple_status status = supple_follow(object(STATE, 0), one_in(60) ? NULL : located, count, one_in(60) ? NULL : positions,
+                                                   wanted_fast, wanted());
+        told_well(status, positions, 12 * (size_t)count, before[0]);
+        told_well(wanted_fast == NULL ? SUPPLE_E_NULL : status, fast, 12 * (size_t)count, before[1]);
+        return status;
+    }
+    uint32_t *t = end_of(&of_tets, 16 * (size_t)elements);
+    float *p = end_of(&of_points, 12 * (size_t)nodes);
+    memcpy(t, tets, 16 * (size_t)elements), memcpy(p, points, 12 * (size_t)nodes);
+    for (uint32_t n = below(4); n > 0 && nodes > 0 && one_in(4); n--) {
+        t[below(4 * elements)] = number(below(NODES)), p[below(3 * nodes)] = wild(0.05f);
+    }
+    if (kind == 1) {
+        const uint32_t count = below(PLACES + 1);
+        float *places = end_of(&of_out, 12 * (size_t)count);
+        for (uint32_t n = 0; n < 3 * count; n++) {
+            places[n] = wild(0.08f);
+        }
+        const size_t needed = supple_locate_size(elements), bytes = one_in(20) ? below((uint32_t)needed) : needed;
+        void *scratch = end_of(&of_scratch, (bytes + 3) / 4 * 4);
+        supple_followed_point *located = end_of(&of_places, count * sizeof *located);
+        const uint64_t before = hash(located, count * sizeof *located);
+        const supple_status status = supple_locate(p, nodes, t, elements, one_in(60) ? NULL : places, count, one_in(60) ? NULL : scratch, bytes,
+                                                   one_in(60) ? NULL : located, wanted());
+        if (status < 0 && hash(located, count * sizeof *located) != before) {
+            fail("a refused call has written", status);
+        }
+        for (uint32_t n = 0; status >= 0 && n < count; n++) {
+            kept[n] = located[n];
+            told_well(status, located[n].weights, sizeof located[n].weights + sizeof located[n].distance, 0);
+            CHECK(located[n].element < elements && located[n].weights[0] >= 0.0f && located[n].weights[3] <= 1.0f);
+        }
+        return status;
+    }
+    supple_image_grid grid = {{-0.01, -0.01, -0.01}, {0.01, 0.01, 0.01}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {1 + below(SIDE), 1 + below(SIDE), 1 + below(SIDE)}};
+    for (int axis = 0; axis < 3; axis++) {
+        grid.spacing[axis] *= one_in(3) ? 0.1 + (double)share() : 1.0;
+        grid.size[axis] = one_in(3) ? number(grid.size[axis]) : grid.size[axis];
+        if (one_in(12)) {
+            grid.spacing[axis] = (double)wild(0.01f) * (one_in(2) ? 1.0 : pow(10.0, (double)below(600) - 300.0));
+        } else if (one_in(12)) {
+            grid.origin[axis] = (double)wild(0.1f) * (one_in(2) ? 1.0 : pow(10.0, (double)below(600) - 300.0));
+        } else if (one_in(20)) {
+            grid.direction[axis][below(3)] = (double)wild(1.0f);
+        }
+    }
+    const float reach = one_in(2) ? 0.0f : wild(0.05f);
+    size_t needed = 64, covered = 0;
+    supple_status status = supple_displacement_field_size(one_in(60) ? NULL : &grid, reach, one_in(60) ? NULL : &needed, wanted());
+    if (status < 0 && !one_in(2)) {
+        return status;
+    }
+    error.status = SUPPLE_OK;
+    /* With room for fewer: as much as there is. */
+    needed = needed < of_scratch.room ? needed : of_scratch.room / 2;
+    const double count = (double)grid.size[0] * grid.size[1] * grid.size[2];
+    const size_t floats = count < SIDE * SIDE * SIDE ? 3 * (size_t)count : 3 * SIDE * SIDE, bytes = one_in(20) ? below((uint32_t)needed) : needed;
+    float *field = end_of(&of_field, 4 * floats), *moved = end_of(&of_rest, 12 * NODES);
+    supple_vectors from = {moved, 12, nodes};
+    const float far = one_in(5) ? powf(10.0f, (float)below(38)) : 0.003f;
+    for (int n = 0; n < 3 * NODES; n++) {
+        moved[n] = one_in(200) ? wild(far) : far * share();
+    }
+    if (one_in(3)) {
+        status = supple_displacements(object(STATE, 0), &from);
+        if (status < 0) {
+            return status;
+        }
+    }
+    const uint64_t before = hash(field, 4 * floats);
+    status = supple_displacement_field(p, nodes, t, elements, one_in(60) ? NULL : &from, number(below(2)), one_in(60) ? NULL : &grid, reach,
+                                       one_in(60) ? NULL : end_of(&of_scratch, (bytes + 3) / 4 * 4), bytes, one_in(60) ? NULL : field,
+                                       one_in(20) ? floats / 2 : floats, one_in(9) ? NULL : &covered, wanted());
+    told_well(status, field, 4 * floats, before);
+    CHECK((double)covered <= count);
+    return status;
+}
+
+/* Another scene, or other tissues, under a state that moves; nothing that was prepared for the former one is prepared again. */
+static supple_status exchange(void) {
+    const supple_tissue others[2] = {{{one_in(3) ? wild(500.0f) : 300.0f, one_in(3) ? wild(1e4f) : 900.0f, 2e4f, 0.0f}, number(1000)}, tissue};
+    switch (below(4)) {
+        case 0: return supple_set_tissues(object(SCENE, 1), one_in(60) ? NULL : others, number(1) % 3, wanted());
+        case 1: return supple_contact_carry_on(object(CONTACT, 1), object(SCENE, 0), object(CONTACT, 1));
+        default: return supple_state_carry_on(object(SCENE, 0), object(STATE, 1));
     }
 }
 
@@ -581,7 +829,9 @@ static supple_status step(void) {
             state_slot = slots[slot].at == (void *)state && slot / EACH == STATE ? slot : state_slot;
             large_slot = large != NULL && slots[slot].at == (void *)large && slot / EACH == LARGE ? slot : large_slot;
         }
-        const int compared = state_slot >= 0 && (large == NULL || large_slot >= 0);
+        /* Pulls of a refused long step stay in its inertia. */
+        const int is_free = large == NULL || loads == NULL || (one_in(3) && supple_set_pulls(loads, NULL) == SUPPLE_OK);
+        const int compared = state_slot >= 0 && (large == NULL || large_slot >= 0) && is_free;
         if (compared) {
             memcpy(end_of(&copies[0], slots[state_slot].bytes), state, slots[state_slot].bytes);
             if (large != NULL) {
@@ -654,7 +904,8 @@ static supple_settings some_settings(void) {
     made.struct_size = number(made.struct_size), made.abi = number(made.abi), made.steps = number(below(4));
     made.seconds = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-4f, made.damping = one_in(5) ? wild(20.0f) : 20.0f;
     made.tolerance = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-3f;
-    made.most_steps = one_in(2) ? 0 : number(1 + below(30));
+    /* Never as many as it takes: stiff tissue, or a length that is drawn, takes millions. */
+    made.most_steps = 1 + below(one_in(2) ? 30 : 1000);
     made.guard = number(below(2)), made.fallback = number(below(2)), made.lead_in = (double)(one_in(20) ? wild(0.01f) : 0.0f);
     for (int axis = 0; axis < 3; axis++) made.cells[axis] = number(1 + below(2));
     if (made.cells[0] * made.cells[1] * made.cells[2] > 8) made.cells[below(3)] = 0;
@@ -692,13 +943,18 @@ static supple_status use_sim(void) {
         const float gravity[3] = {wild(10.0f), wild(10.0f), wild(10.0f)};
         return supple_set_gravity(objects.loads, gravity);
     }
+    contacts_may_change();
     if (one_in(12)) return supple_state_reset(objects.state);
+    if (one_in(8)) {
+        return one_in(2) ? supple_set_pulls(objects.loads, one_in(4) ? NULL : object(PULLS, 1))
+                         : supple_set_pressure(objects.loads, one_in(4) ? NULL : object(PRESSURE, 0));
+    }
+    if (one_in(12)) return read_pulls(object(PULLS, 1), objects.state);
     if (one_in(10)) {
-        /* Other tissues, or the state of another simulation. Stiff ones have short steps: the work of a call is bounded. */
-        supple_settings settings = some_settings();
-        settings.most_steps = 1 + below(30);
+        /* Other tissues, or the state of another simulation. */
+        const supple_settings settings = some_settings();
         const supple_tissue others[2] = {{{wild(59.0f), 8.0f, 60000.0f, 0.0f}, 1000.0f}, {{100.0f, 8.0f, 60000.0f, 0.0f}, number(1000)}};
-        return one_in(2) ? supple_sim_set_tissues(sim, one_in(60) ? NULL : others, below(3), &settings, wanted())
+        return one_in(2) ? supple_sim_set_tissues(sim, one_in(60) ? NULL : others, below(3), one_in(3) ? NULL : &settings, wanted())
                          : supple_sim_carry_on(sim, object(SIM, 1), one_in(60) ? NULL : &settings, wanted());
     }
     if (objects.contact != NULL && one_in(4)) {
@@ -799,6 +1055,11 @@ static supple_status settle(void) {
     const size_t needed = (supple_settle_size(NODES) + 63) / 64 * 64;
     unsigned char *at = end_of(&of_rest, needed);
     supple_settled told;
+    if (one_in(4)) {
+        const supple_status done = supple_sim_settle(object(SIM, 1), 1e-5f, below(30), NULL, at, needed, &told);
+        CHECK(told.error.status == (done < 0 ? done : SUPPLE_OK) && !(told.remaining < 0.0f));
+        return done;
+    }
     const supple_status status = supple_settle(scene, object(LOADS, 1), object(STATE, 1), one_in(5) ? wild(1e-4f) : 1e-5f, below(60), NULL,
                                                one_in(60) ? NULL : at, one_in(20) ? 64 * below((uint32_t)(needed / 64)) : needed, &told);
     CHECK(told.error.status == (status < 0 ? status : SUPPLE_OK) && !(told.remaining < 0.0f) && (told.steps > 0 || status != SUPPLE_OK));
@@ -809,7 +1070,7 @@ static supple_status other(void) {
     supple_learned_facts facts;
     supple_scene_facts of_scene;
     switch (below(6)) {
-        case 4: return one_in(2) ? supple_state_stop(object(SCENE, 0), object(STATE, 1)) : supple_state_carry_on(object(SCENE, 0), object(STATE, 1));
+        case 4: return supple_state_stop(object(SCENE, 0), object(STATE, 1));
         case 5: return supple_learned_fall_back(object(LEARNED, 1), object(STATE, 0));
         case 0: return supple_scene_describe(object(SCENE, 0), one_in(20) ? NULL : &of_scene);
         case 1: return supple_learned_describe(object(LEARNED, 0), one_in(20) ? NULL : &facts);
@@ -820,11 +1081,12 @@ static supple_status other(void) {
 
 /* Sound objects, one of each kind, with a law, an element, a method and a threading of their own. */
 static void begin_anew(void) {
-    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_contact, make_learned, make_large, make_guard, make_adaptive, make_sim};
+    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_contact, make_pulls, add_pull, make_pressure,
+                                                make_learned, make_large, make_guard, make_adaptive, make_sim};
     is_calm = 1, doing = "sound objects";
     for (size_t n = 0; n < sizeof makers / sizeof *makers; n++) {
         const supple_status status = makers[n]();
-        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != make_adaptive && makers[n] != make_sim && makers[n] != set_step) {
+        if (status < 0 && makers[n] != add_pull && makers[n] != make_large && makers[n] != make_guard && makers[n] != make_adaptive && makers[n] != make_sim && makers[n] != set_step) {
             fail("refused", status);
         }
     }
@@ -842,9 +1104,10 @@ static void one_call(void) {
                {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
                {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20},
                {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}, {"surfaces", surfaces, 6},
-               {"settling", settle, 8}};
+               {"settling", settle, 8}, {"pulls", make_pulls, 3}, {"a pull", pull, 40}, {"pressures", make_pressure, 3},
+               {"a pressure", press, 24}, {"points and fields", points_and_fields, 20}, {"an exchange", exchange, 6}};
     int at = 0;
-    for (int draw = (int)below(227); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(323); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -877,7 +1140,7 @@ static void one_call(void) {
         if (!(may_move && slots[slot].written) && now != states[n]) {
             fail("a state has moved", status);
         }
-        const int is_used = all[at].call == use_sim || all[at].call == make_sim;
+        const int is_used = all[at].call == use_sim || all[at].call == make_sim || all[at].call == settle;
         if (sim_hash(SIM * EACH + n, &finite) != sims[n] && !(is_used && slots[SIM * EACH + n].written)) {
             fail("the state of a simulation has moved", status);
         }
@@ -898,7 +1161,7 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16, 1 << 20};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16, 1 << 20, 1 << 13, 1 << 14};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;
@@ -907,6 +1170,9 @@ int main(int argc, char **argv) {
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
     of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 13);
     of_rest = arena_of(supple_settle_size(NODES) + 64);
+    of_places = arena_of(PLACES * sizeof(supple_followed_point)), of_found = arena_of(16 * TETS);
+    of_field = arena_of(12 * SIDE * SIDE * SIDE), of_scratch = arena_of(1 << 16);
+    CHECK(supple_boundary(tets[0], TETS, of_bar[0], 12 * TETS, &bar_triangles) == SUPPLE_OK);
     copies[0] = arena_of(sizes_of[STATE]), copies[1] = arena_of(sizes_of[LARGE]);
     file("weights/compact-10.weights", of_weights.start, of_weights.room, &weights_bytes);
     memmove(end_of(&of_weights, (weights_bytes + 63) / 64 * 64), of_weights.start, weights_bytes);

@@ -693,7 +693,7 @@ static void remarks(supple_scene_config config) {
     DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
     CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
     CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
-    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_THIN; kind++) {
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_HELD_PULL; kind++) {
         CHECK(strlen(supple_remark_text(kind)) > 10);
     }
     CHECK(strcmp(supple_remark_text(0), "?") == 0);
@@ -777,6 +777,18 @@ static void pressures_and_rest(void) {
     REFUSED(SUPPLE_E_INDEX, PRESSED(memory, bytes, faces[0], NULL, 1));
     CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
     faces[1][2] = last;
+    /* Surfaces that are mixed, in whichever way, come to the same. */
+    static uint32_t mixed[4 * TETS][3], of_mixed[4 * TETS];
+    uint64_t sums[2];
+    for (uint32_t way = 0; way < 2; way++) {
+        for (uint32_t n = 0; n < count; n++) {
+            const uint32_t at = way == 0 ? n : count - 1 - n;
+            memcpy(mixed[n], faces[at], sizeof mixed[n]), of_mixed[n] = at % 2;
+        }
+        DONE(supple_pressure_init(memory, bytes, scene, points[0], mixed[0], of_mixed, count, 2, &pressure, &error));
+        sums[way] = hash(memory + SUPPLE_PRESSURE_FRONT, 52 * (size_t)count);
+    }
+    CHECK(sums[0] == sums[1]);
     DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[0], surface_of, count, 2, &pressure, &error));
     REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_set(pressure, 0, NAN, 0.0f));
     REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_set(pressure, 0, 1.0f, -1.0f));
@@ -1060,10 +1072,16 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_MISMATCH, supple_set_targets(made, targets[0], 1, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, INFINITY, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     CHECK(error.index == 0);
+    REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, 3e6f, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     DONE(supple_set_targets(made, targets[0], 2, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_pulls(small_loads, made));
     REFUSED(SUPPLE_E_KIND, supple_set_pulls(acts, (supple_pulls *)(void *)state));
     DONE(supple_set_pulls(acts, made));
+    /* The corner is held. */
+    supple_remark told[2];
+    uint32_t count = 0;
+    DONE(supple_remarks(scene, points[0], acts, NULL, told, 2, &count));
+    CHECK(count == 1 && told[0].kind == SUPPLE_REMARK_HELD_PULL && told[0].index == 1);
     supple_report report;
     supple_pulled read[2];
     DONE(supple_state_reset(state));
@@ -1076,6 +1094,14 @@ static void pulls(void) {
     CHECK(fabsf(read[0].force[0] - pull.stiffness * read[0].gap[0]) < 1e-3f * read[0].force[0]);
     CHECK(read[1].force[0] == 0.0f && read[1].gap[0] == 0.0f);
 
+    /* A step that is refused leaves no force. */
+    const float strong = 1e9f;
+    DONE(supple_set_forces(acts, &(const supple_force){NODES / 2, {strong, 0, 0}, 0}, 1, &error));
+    CHECK(supple_step(scene, acts, state, 1, NULL, &report) == SUPPLE_E_DIVERGED_FORCE);
+    DONE(supple_set_forces(acts, NULL, 0, &error));
+    DONE(supple_read_pulls(made, state, read, 2));
+    CHECK(read[0].force[0] == 0.0f && read[0].gap[0] > 0.0f);
+
     /* Learned steps do not know pulls. */
     supple_learned_facts facts;
     DONE(supple_state_reset(state));
@@ -1087,6 +1113,15 @@ static void pulls(void) {
     CHECK(supple_learned_step(scene, acts, state, learned, 1, NULL, &report) == SUPPLE_E_NO_PULLS);
     note(SUPPLE_E_NO_PULLS);
     DONE(supple_set_pulls(acts, NULL));
+
+    /* Nodes as far away as numbers go. */
+    static float far[NODES][3];
+    const float two = 2.0f;
+    far[NODES - 1][1] = 3e38f;
+    DONE(supple_pulls_init(memory, bytes, scene, MOST, ROOM, &made));
+    DONE(supple_add_pull_of_nodes(made, scene, corners, &two, 1, &pull, &error));
+    DONE(supple_set_displacements(scene, state, far[0], NODES, &error));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_read_pulls(made, state, read, 1));
     DONE(supple_state_reset(state));
 }
 
@@ -1120,6 +1155,9 @@ static void images(void) {
     CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
     located[1].nodes[3] = 0, located[1].weights[0] = INFINITY;
     REFUSED(SUPPLE_E_NOT_FINITE, FOLLOW(moved[0], NULL));
+    located[1].weights[0] = 1e30f;
+    REFUSED(SUPPLE_E_NOT_FINITE, FOLLOW(moved[0], NULL));
+    CHECK(error.index == 1 && error.value == (double)1e30f);
 
     const supple_image_grid good = {{0, 0, 0}, {0.01, 0.01, 0.01}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {3, 3, 3}};
     supple_image_grid bad = good;

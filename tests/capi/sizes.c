@@ -9,13 +9,23 @@ static supple_large_config large_of(uint32_t x, uint32_t y, uint32_t z) {
 }
 
 int main(void) {
+    CHECK(sizeof(supple_followed_point) == 52);
     unsigned long checked = 0;
     for (uint32_t nodes = 1; nodes < 3000000; nodes += nodes / 7 + 1) {
         for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_STRAIN; element++) {
             CHECK(supple_settle_size(nodes) == SUPPLE_SETTLE_SIZE(nodes));
             CHECK(supple_pressure_size(nodes, element) == SUPPLE_PRESSURE_SIZE(nodes, element));
+            CHECK(supple_pulls_size(nodes, 24 * element) == SUPPLE_PULLS_SIZE(nodes, 24 * element));
+            CHECK(supple_pulls_size(element, nodes) == SUPPLE_PULLS_SIZE(element, nodes));
             CHECK(supple_state_size(nodes, element) == SUPPLE_STATE_SIZE(nodes, element));
         }
+        /* As docs/sizes.md says: from 20 to 32 bytes for each element, and a little. */
+        CHECK(supple_locate_size(nodes) >= 8 * (size_t)nodes && supple_locate_size(nodes) <= 32 * (size_t)nodes + 256);
+        const supple_image_grid grid = {{0, 0, 0}, {1e-3, 1e-3, 1e-3}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {100, 90, nodes % 999 + 8}};
+        const size_t at = 9000 * (size_t)grid.size[2];
+        size_t alike, near;
+        CHECK(supple_displacement_field_size(&grid, 0.0f, &alike, NULL) == SUPPLE_OK && alike <= 2 * at + 512);
+        CHECK(supple_displacement_field_size(&grid, 1e-3f, &near, NULL) == SUPPLE_OK && near <= alike + 8 * at + 512);
         for (uint32_t fallback = 0; fallback < 2; fallback++) {
             CHECK(supple_learned_size(nodes, fallback) == SUPPLE_LEARNED_SIZE(nodes, fallback));
         }

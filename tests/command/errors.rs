@@ -192,6 +192,10 @@ fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
             "line 13: nodes move at 2.50 m/s, faster than shear waves in the softest tissue (1.00 m/s), which cannot follow; a \
              ramp of 0.010 s is slower",
         ),
+        (
+            with("[[pull]]\npoint = [0.01, 0.01, 0.0]\nradius = 0.002\nstiffness = 10.0\n"),
+            "line 13: all nodes of a pull are held: it moves nothing",
+        ),
     ];
     for (scene, words) in cases {
         let said = desk.simulate(&scene, &["--force"]);

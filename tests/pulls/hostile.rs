@@ -19,6 +19,10 @@ fn what_cannot_be_is_refused_in_words() {
         (Pull { stiffness: 2e6, ..good }, "pull 1: a stiffness of 2000000 N/m"),
         (Pull { most: -0.1, ..good }, "pull 1: a most force of -0.1 N"),
         (Pull { to: [0.0, f32::INFINITY, 0.0], ..good }, "pull 1: a component of its target is inf"),
+        (
+            Pull { from: [2e6; 3], ..good },
+            "pull 1: a component of its target is 2000000, it must be a number up to 1e6",
+        ),
         (Pull { along: [f32::NAN; 3], ..good }, "pull 1: a component of its direction is NaN"),
         (Pull { times: [0.0, f64::NAN], ..good }, "pull 1: a component of its time is NaN"),
     ] {
@@ -27,6 +31,8 @@ fn what_cannot_be_is_refused_in_words() {
     }
     let told = Pulls::new(3, &nodes, &[good]).unwrap_err();
     assert_eq!(told.to_string(), "entry 0 of the pulled nodes: node 3 does not exist, the scene has 3 nodes");
+    let heavy = [PulledNode { node: 3, weight: 1e30 }];
+    assert!(Pulls::new(10, &heavy, &[good]).unwrap_err().to_string().ends_with("it must be a number up to 1e6"));
     let points: Vec<_> = BAR.points().collect();
     let mut room = [PulledNode::default(); 5];
     let told = patch(&points, |_| 1.0, [1.0, 0.015, 0.06], 0.01, &mut room).unwrap_err();

@@ -82,6 +82,9 @@ def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
             supple.Simulation(scene).advance(1e-5)
     simulation = supple.Simulation(supple.Scene(lobe, tissue, fixed=held))
     assert simulation.remarks() == []
+    pulls = simulation.pull(lobe.points[np.flatnonzero(held)[:1]], radius=1e-6)
+    assert simulation.remarks() == ["pull 0: a pull all of whose nodes are held: it moves nothing"]
+    pulls.release()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulation.advance(1e-3)

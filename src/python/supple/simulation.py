@@ -49,6 +49,7 @@ _PLACES = {
     lib.SUPPLE_REMARK_WAY: "motion",
     lib.SUPPLE_REMARK_SPEED: "motion",
     lib.SUPPLE_REMARK_THIN: "instrument",
+    lib.SUPPLE_REMARK_HELD_PULL: "pull",
 }
 # As supple_force and supple_motion.
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])

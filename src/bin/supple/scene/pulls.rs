@@ -1,10 +1,12 @@
 //! Pulls and springs of a scene file: what draws points of the tissue to targets, and supports that give way.
 
 use serde::Deserialize;
+use supple::element::Axes;
 use supple::material::VecMaterial;
+use supple::plausibility::of_pull;
 use supple::points::VecPoints;
 use supple::pulls::{MOST_STIFFNESS, Pull, PulledNode, Pulls, corners, patch, usual_most};
-use supple::scene::SceneView;
+use supple::scene::{SceneView, Support};
 use toml::Spanned;
 
 use super::body::Body;
@@ -110,6 +112,21 @@ impl ScenePulls {
         Pulls::new(body.local.len(), &self.nodes, &[pull.at(0.0)]).map_err(|error| file.problem(at, error))?;
         self.all.push(pull);
         Ok(())
+    }
+
+    /// Pulls that move nothing, with the place of their entry.
+    pub(crate) fn warnings(&self, file: &SceneFile, supports: &[Support]) -> Vec<String> {
+        let held = |node: u32| {
+            let own = supports.iter().filter(|support| support.node == node);
+            own.fold(Axes::NONE, |axes, support| axes.union(support.axes))
+        };
+        let remark = |(at, pull): (&Spanned<PullTable>, &MovedPull)| {
+            let [first, count] = pull.nodes.map(|number| number as usize);
+            let nodes = self.nodes[first..first + count].iter().filter(|pulled| pulled.weight != 0.0);
+            let remark = of_pull(nodes.map(|pulled| held(pulled.node)), pull.along)?;
+            Some(file.problem(at, remark).to_string())
+        };
+        file.scene.pull.iter().zip(&self.all).filter_map(remark).collect()
     }
 
     /// A node each that is drawn to where it is at rest.

@@ -74,6 +74,7 @@ impl Setup {
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
         warnings.extend(time.old_name.clone());
         warnings.extend(points.warnings(file));
+        warnings.extend(pulls.warnings(file, &supports));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
