@@ -69,7 +69,7 @@ pub struct Pull {
 }
 
 /// Lets pulls let go of nodes that belong to no element of the scene any more; those that have no other ones are absent.
-pub(crate) fn let_go_of_removed<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode], pulls: &mut [Pull]) {
+pub fn let_go_of_removed<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode], pulls: &mut [Pull]) {
     for pull in pulls {
         let [first, count] = pull.nodes.map(|number| number as usize);
         let own = nodes.get_mut(first..).and_then(|nodes| nodes.get_mut(..count));
@@ -81,7 +81,7 @@ pub(crate) fn let_go_of_removed<M>(scene: SceneView<'_, M>, nodes: &mut [PulledN
 
 /// Shares a pull among those of its nodes that still belong to an element of the scene. Whether there are any: else it has
 /// nothing to pull.
-pub(crate) fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
+pub fn let_go<M>(scene: SceneView<'_, M>, nodes: &mut [PulledNode]) -> bool {
     let is_left = |node: u32| !scene.is_alone(node as usize);
     if nodes.iter().all(|pulled| is_left(pulled.node)) {
         return true;

@@ -481,10 +481,10 @@ class Simulation:
         library.checked(status, what="remarks")
         said = []
         for remark in found[0 : min(count[0], room)]:
-            figures = [f"{value:.4g}" for value in (remark.value, remark.limit) if value != 0.0]
+            figures = " against ".join(f"{value:.4g}" for value in (remark.value, remark.limit) if value != 0.0)
             place = f"{_PLACES[remark.kind]} {remark.index}: " if remark.kind in _PLACES else ""
             words = str(ffi.string(lib.supple_remark_text(remark.kind)), "ascii")
-            said.append(f"{place}{words} ({' against '.join(figures) or 'no figure'})")
+            said.append(f"{place}{words} ({figures})" if figures else f"{place}{words}")
         if not len(self.scene._supports) and not self._pull_groups:
             said.append("no node is fixed, moved or pulled: the body is free")
         return said
