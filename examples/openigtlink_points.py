@@ -110,10 +110,6 @@ class Organ:
         if self.pulls:
             self.pulls.release()
         self.pulls, self.names, self.at, self.is_placed = pulls, list(places), at, False
-        # A pull moves its point by the mean of nodes around it, so it takes no part in their turn about that. With all nodes at twice
-        # their place this tells how far it is from their mean.
-        self.body.set_displacements(self.body.scene.mesh.points)
-        self.arms = 2.0 * at - pulls.points
         self.targets, self.time = np.full_like(at, np.nan), 0.0
 
     def seen(self, message):
@@ -135,8 +131,7 @@ class Organ:
         try:
             if not self.is_placed:
                 self.body.set_displacements(supple.rigid_fit(self.at, self.targets)(points) - points)
-            turn = supple.rigid_fit(points, self.body.positions).turn
-            self.pulls.move(self.targets - (self.arms @ turn.T - self.arms), within=FRAME if self.is_placed else 0.0)
+            self.pulls.move(self.targets, within=FRAME if self.is_placed else 0.0)
             status = (self.body.advance(FRAME) if self.is_placed else self.body.settle(1e-4)).status
             self.is_placed = True
         except supple.Error as problem:

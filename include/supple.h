@@ -53,7 +53,7 @@
 #define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
     (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
 #define SUPPLE_PULLS_SIZE(pulls, nodes) \
-    (SUPPLE_PULLS_FRONT + SUPPLE_ARRAY_(nodes, 8) + SUPPLE_ARRAY_(pulls, 80) + SUPPLE_ARRAY_(pulls, 16))
+    (SUPPLE_PULLS_FRONT + SUPPLE_ARRAY_(nodes, 8) + SUPPLE_ARRAY_(pulls, 96) + SUPPLE_ARRAY_(pulls, 16))
 #define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
@@ -2051,6 +2051,19 @@ supple_status supple_set_targets(supple_pulls *pulls,
                                  double from,
                                  double to,
                                  supple_error *error);
+
+/**
+ * Turns the points of pulls with the tissue around them, as it is in a state: a host calls it between frames, and before it
+ * settles. The nodes of a pull move its point by their mean, and near a surface, where they are all on one side of the
+ * point, it moves by more than that where they turn: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart.
+ *
+ * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param most the largest change of a point, m; may be NULL.
+ */
+supple_status supple_turn_pulls(supple_pulls *pulls,
+                                const float *points,
+                                supple_state *state,
+                                float *most);
 
 /**
  * Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.

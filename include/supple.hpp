@@ -1185,6 +1185,11 @@ public:
         return detail::of(supple_set_targets(raw_, targets.data(), static_cast<std::uint32_t>(count < none ? count : none), from, to, why));
     }
 
+    // Turns the points with the body, between frames; `most` is the largest change, m. `points` are those of the scene at rest.
+    status turn(span<const float> points, state moved, float *most = nullptr) const noexcept {
+        return detail::of(supple_turn_pulls(raw_, points.data(), moved.raw(), most));
+    }
+
     // Where all are, how far from their targets, and the forces on the tissue.
     status read(state moved, span<pulled> out) const noexcept {
         return detail::of(supple_read_pulls(raw_, moved.raw(), out.data(), static_cast<std::uint32_t>(out.size() < none ? out.size() : none)));

@@ -70,7 +70,7 @@ fn force_of<M: ElementMaterial>(trial: &Trial<'_, M>, step: &Step, pulls: &Pulls
     let half = 0.5 * step.carry();
     let ahead =
         pulls.mean(pull, |node| half * Vec3::from(trial.increment.get(node).copied().unwrap_or_default().to_array()));
-    let gap = (pull.target(middle) - Vec3::from_array(pull.at)) - (trial.moved_mean(pulls, pull) + ahead);
+    let gap = (pull.target(middle) - pull.unmoved()) - (trial.moved_mean(pulls, pull) + ahead);
     pull.force(gap, Vec3::ZERO, Vec3::ZERO)
 }
 

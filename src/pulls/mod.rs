@@ -23,8 +23,10 @@
 //! Steps keep nothing of pulls but their forces, for the host to read ([`Pulls::read`]).
 
 mod patch;
+mod turn;
 
 pub use patch::{corners, patch};
+pub use turn::turn;
 
 use core::fmt;
 
@@ -53,6 +55,8 @@ pub struct Pull {
     pub nodes: [u32; 2],
     /// Where its point is at rest, m.
     pub at: [f32; 3],
+    /// How far it has turned with the body about the mean place of its nodes, m ([`turn`]).
+    pub turned: [f32; 3],
     /// N/m; 0: absent.
     pub stiffness: f32,
     /// The most force, N; infinite: no limit.
@@ -112,7 +116,17 @@ impl Pull {
     /// A pull at a point (m, at rest), of so many N/m without a limit ([`usual_most`] is one), whose target is there.
     #[must_use]
     pub const fn new(nodes: [u32; 2], at: [f32; 3], stiffness: f32) -> Self {
-        Self { nodes, at, stiffness, most: f32::INFINITY, along: [0.0; 3], from: at, to: at, times: [0.0; 2] }
+        Self {
+            nodes,
+            at,
+            stiffness,
+            most: f32::INFINITY,
+            turned: [0.0; 3],
+            along: [0.0; 3],
+            from: at,
+            to: at,
+            times: [0.0; 2],
+        }
     }
 
     /// Whether it acts.
@@ -143,6 +157,11 @@ impl Pull {
         let share = ((time - start) / (end - start)).clamp(0.0, 1.0) as f32;
         let [from, to] = [self.from, self.to].map(Vec3::from_array);
         from + share * (to - from)
+    }
+
+    /// Where its point would be if its nodes had turned only, m.
+    pub(crate) fn unmoved(&self) -> Vec3 {
+        Vec3::from_array(self.at) + Vec3::from_array(self.turned)
     }
 
     /// The direction along which it pulls, of length one, if there is one.
@@ -273,7 +292,7 @@ impl<'a> Pulls<'a> {
     pub fn read(&self, index: usize, displacements: &[NodeVector], forces: &[NodeVector], time: f64) -> Option<Pulled> {
         let pull = self.pulls.get(index)?;
         let moved = self.mean(pull, |node| displacements.get(node).copied().unwrap_or_default().to_array().into());
-        let at = Vec3::from_array(pull.at);
+        let at = pull.unmoved();
         let gap = if pull.acts() { pull.gap((pull.target(time) - at) - moved) } else { Vec3::ZERO };
         let force = forces.get(index).copied().unwrap_or_default().to_array();
         Some(Pulled { point: (at + moved).to_array(), gap: gap.to_array(), force })

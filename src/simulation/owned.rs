@@ -19,7 +19,7 @@ use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
 use crate::points::{PointError, VecPoints};
 use crate::pressure::VecPressure;
-use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, let_go, patch, usual_most};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, let_go, patch, turn, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -191,6 +191,12 @@ impl<'w> Simulation<'w> {
         let most = usual_most(self.scene.view(), self.pulled.get(first..).unwrap_or_default());
         self.pulls.push(Pull { most, ..Pull::new([first as u32, count as u32], point, stiffness) });
         Ok(self.pulls.len() - 1)
+    }
+
+    /// Turns the points of pulls with the body ([`turn`]), as a host does between frames of a body that turns. Gives the
+    /// largest change, m.
+    pub fn turn_pulls(&mut self) -> f32 {
+        turn(&self.points, self.state.displacements(), &self.pulled, &mut self.pulls)
     }
 
     /// Where the point of a pull is and how it is pulled. None if there is no such pull.

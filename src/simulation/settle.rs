@@ -12,7 +12,8 @@ use crate::tled::{self, Settled, settle_in_parts, vectors_to_settle};
 impl Simulation<'_> {
     /// Brings the body to rest under its loads and instruments ([`tled::settle`]): every node to within about `metre` (m)
     /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
-    /// time, which stands still, and velocities are zero afterwards; steps of every method go on from there. Where a
+    /// time, which stands still, the points of pulls turned with the body as it is before ([`Simulation::turn_pulls`]), and
+    /// velocities are zero afterwards; steps of every method go on from there. Where a
     /// step is refused the error says why, and the state is that before it.
     pub fn settle(&mut self, metre: f32, most_steps: u32) -> Result<Settled, SimulationError> {
         self.settle_in_parts(metre, most_steps, &CallingThread)
@@ -25,6 +26,7 @@ impl Simulation<'_> {
         most_steps: u32,
         threads: &impl Threads,
     ) -> Result<Settled, SimulationError> {
+        self.turn_pulls();
         let Acting { mut loads, scene, state, .. } = self.acting()?;
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
         let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, most_steps, &mut room, threads)?;

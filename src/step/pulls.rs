@@ -39,7 +39,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             for (index, pull) in pulls.acting() {
                 let now = at(self.pulls, index);
                 let point = self.pulled_point(pulls, pull, (step, method));
-                let gap = (pull.target(end) - Vec3::from_array(pull.at)) - (point.here + point.next);
+                let gap = (pull.target(end) - pull.unmoved()) - (point.here + point.next);
                 let change = pull.force(gap, now, point.compliance) - now;
                 let first = pulls.nodes_of(pull).first();
                 let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));

@@ -1086,6 +1086,14 @@ static void pulls(void) {
     supple_pulled read[2];
     DONE(supple_state_reset(state));
     DONE(supple_step(scene, acts, state, 2000, NULL, &report));
+    /* It has hardly turned. */
+    float turned = -1.0f;
+    REFUSED(SUPPLE_E_NULL, supple_turn_pulls(made, NULL, state, &turned));
+    REFUSED(SUPPLE_E_MISMATCH, supple_turn_pulls(made, points[0], small_state, &turned));
+    REFUSED(SUPPLE_E_NULL, supple_turn_pulls(NULL, points[0], state, &turned));
+    DONE(supple_turn_pulls(made, points[0], state, NULL));
+    DONE(supple_turn_pulls(made, points[0], state, &turned));
+    CHECK(turned >= 0.0f && turned < 1e-3f);
     REFUSED(SUPPLE_E_MISMATCH, supple_read_pulls(made, state, read, 1));
     REFUSED(SUPPLE_E_NULL, supple_read_pulls(made, state, NULL, 2));
     REFUSED(SUPPLE_E_MISMATCH, supple_read_pulls(made, small_state, read, 2));

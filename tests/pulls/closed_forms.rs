@@ -150,3 +150,43 @@ fn settling_comes_to_rest_where_damped_steps_do() {
     println!("{:.5} mm apart of {:.2} mm after {steps} steps", 1e3 * most, 1e3 * size);
     assert!(most < 2e-5 && size > 0.005);
 }
+
+/// Points of the surface are not in the middle of their nodes.
+#[test]
+fn the_points_of_a_body_that_turns_turn_with_it() {
+    let turned = |degrees: f32| {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        move |[x, y, z]: [f32; 3]| [cosine * x - sine * z + 0.01, y - 0.02, sine * x + cosine * z]
+    };
+    let at = [[0.0, 0.0, 0.0], [0.03, 0.03, 0.0], [0.03, 0.0, 0.12], [0.0, 0.03, 0.12], [0.0, 0.015, 0.06]];
+    let drawn = |settles: bool, turns: bool| {
+        let mut body = bar(Element::NodalStrain, false).with(settings(Method::Exact, 20.0, None));
+        at.iter().for_each(|&at| assert!(body.pull(at, 0.02, 500.0).is_ok()));
+        let points = body.points().to_vec();
+        let aim = |body: &mut Simulation<'_>, degrees: f32| {
+            body.pulls.iter_mut().zip(at).for_each(|(pull, at)| pull.put(turned(degrees)(at)));
+        };
+        if settles {
+            let moved = points.iter().map(|&at| [0, 1, 2].map(|axis| turned(40.0)(at)[axis] - at[axis]));
+            body.set_displacements(&moved.collect::<Vec<_>>()).unwrap();
+            aim(&mut body, 40.0);
+            assert!(body.settle(1e-6, 5000).unwrap().at_rest);
+        } else {
+            for frame in 0..150_u8 {
+                aim(&mut body, 0.5 * f32::from(frame.min(80)));
+                if turns {
+                    body.turn_pulls();
+                }
+                assert!(body.advance(1.0 / 60.0).unwrap().is_ok());
+            }
+        }
+        let off = |(at, u): (&[f32; 3], &supple::state::NodeVector)| {
+            let (wanted, u) = (turned(40.0)(*at), u.to_array());
+            length([0, 1, 2].map(|axis| at[axis] + u[axis] - wanted[axis]))
+        };
+        points.iter().zip(body.displacements()).map(off).fold(0.0, f32::max)
+    };
+    let (settled, moved, without) = (drawn(true, true), drawn(false, true), drawn(false, false));
+    println!("settled {:.4} mm off, moved {:.4}, points not turned {:.2}", 1e3 * settled, 1e3 * moved, 1e3 * without);
+    assert!(settled < 1e-5 && moved < 2e-5 && without > 1e-3);
+}

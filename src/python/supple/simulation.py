@@ -379,7 +379,8 @@ class Simulation:
         given, some 24 nodes), with `stiffness` (N/m, one
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
         (three quarters of the shear modulus on a face of the cube of its nodes' volume unless given; more tears the tissue). With `along`, a direction for all or for
-        each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent."""
+        each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent. A point turns with
+        the body whenever targets move, and before it settles."""
         radius = _PATCH * self.scene._edge if radius is None else radius
         wanted = wanted_of(points, radius, stiffness, most, along)
         made, outside = Pulls(self, wanted), self.locate(wanted.points).distances
@@ -399,6 +400,8 @@ class Simulation:
 
     def _set_pulls(self, groups: list[Wanted]) -> None:
         memory = PullMemory(self, groups) if groups else None
+        if memory:
+            memory.turn(self.scene.mesh.points, self._state)
         library.checked(lib.supple_set_pulls(self._loads, memory.raw if memory else ffi.NULL), what="pulls")
         self._pull_memory, self._pull_groups = memory, groups
 
@@ -413,6 +416,7 @@ class Simulation:
         if not (np.isfinite(within) and within >= 0.0):
             raise InputError(f"within {within} s: it must be zero or more")
         assert self._pull_memory is not None
+        self._pull_memory.turn(self.scene.mesh.points, self._state)
         # A later move of one group goes on from where the targets of the others are.
         all_targets = [targets if group is wanted else group.targets for group in self._pull_groups]
         self._pull_memory.aim(np.concatenate(all_targets), (self.time, self.time + within))
@@ -582,6 +586,8 @@ class Simulation:
             raise InputError(f"settle to within {metre} m: it must be a positive number")
         self._warn_once()
         room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
+        if self._pull_memory:
+            self._pull_memory.turn(self.scene.mesh.points, self._state)
         told = ffi.new("supple_settled *")
         status = lib.supple_sim_settle(self._sim, metre, int(most_steps), self._threads, room.pointer, room.size, told)
         library.checked(status, told.error, "settle")
