@@ -2053,9 +2053,9 @@ supple_status supple_set_targets(supple_pulls *pulls,
                                  supple_error *error);
 
 /**
- * Turns the points of pulls with the tissue around them, as it is in a state: a host calls it between frames, and before it
- * settles. The nodes of a pull move its point by their mean, and near a surface, where they are all on one side of the
- * point, it moves by more than that where they turn: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart.
+ * Turns the points of pulls with the body, as it is in a state: a host calls it between frames, and before it settles. The
+ * nodes of a pull move its point by their mean. Near a surface, where they are all on one side of the point, its tissue
+ * moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart.
  *
  * @param points of all nodes of the scene at rest, m, three coordinates each.
  * @param most the largest change of a point, m; may be NULL.
