@@ -51,7 +51,8 @@ class Clients(socketserver.ThreadingTCPServer):
 
     def finish_request(self, client, _):
         """All that a client sends, in a thread of its own."""
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", 1, 0))  # s, to take what it gets
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", 0, 50_000))  # s, us: a client that does not read is let go
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 23)
         self.sockets.add(client)
         with contextlib.suppress(OSError, ValueError), client.makefile("rb") as stream:
             while len(header := stream.read(MessageBase.IGTL_HEADER_SIZE)) == MessageBase.IGTL_HEADER_SIZE:
@@ -61,7 +62,7 @@ class Clients(socketserver.ThreadingTCPServer):
                     break
                 body, message = stream.read(fields["body_size"]), MessageBase.create_message(fields["message_type"])
                 try:
-                    if isinstance(message, pyigtl.PointMessage):
+                    if isinstance(message, pyigtl.PointMessage) and fields["device_name"] in ("Rest", "Seen"):
                         message.unpack(fields, body)
                         self.messages[message.device_name], self.wrong = message, ""
                 except Exception as problem:  # whatever pyigtl comes across
@@ -142,7 +143,8 @@ class Organ:
 
     def transform(self):
         rigid, matrix = supple.rigid_fit(self.tumour.rest, self.tumour.positions), np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = rigid.turn * self.scale / self.scale[:, None], rigid.shift / self.scale
+        matrix[:3, :3] = rigid.rotation * self.scale / self.scale[:, None]
+        matrix[:3, 3] = rigid.translation / self.scale
         return pyigtl.TransformMessage(matrix, device_name="Tumour")
 
     def image(self):

@@ -50,7 +50,7 @@ int main(int count, char **words) {
         for (std::uint32_t n = 0; n < points; n++) seen(tracked[n], end, targets + 3 * n);
         const std::uint32_t lost = std::uint32_t(frame) / 3 % points;
         targets[3 * lost] = std::numeric_limits<float>::quiet_NaN(); // not seen in this frame
-        done(pulls.turn(mesh.points, lobe.state())); // with the body
+        done(pulls.turn(lobe.scene(), mesh.points, lobe.state())); // with the body
         done(pulls.aim(targets, now, end));
         done(lobe.advance(1.0 / 60.0));
         if (frame % 20 < 19) continue;

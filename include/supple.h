@@ -2055,12 +2055,14 @@ supple_status supple_set_targets(supple_pulls *pulls,
 /**
  * Turns the points of pulls with the body, as it is in a state: a host calls it between frames, and before it settles. The
  * nodes of a pull move its point by their mean. Near a surface, where they are all on one side of the point, its tissue
- * moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart.
+ * moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart. A
+ * pull that is added to a body that has turned is turned by this, too.
  *
  * @param points of all nodes of the scene at rest, m, three coordinates each.
  * @param most the largest change of a point, m; may be NULL.
  */
 supple_status supple_turn_pulls(supple_pulls *pulls,
+                                const supple_scene *scene,
                                 const float *points,
                                 supple_state *state,
                                 float *most);

@@ -1186,8 +1186,8 @@ public:
     }
 
     // Turns the points with the body, between frames; `most` is the largest change, m. `points` are those of the scene at rest.
-    status turn(span<const float> points, state moved, float *most = nullptr) const noexcept {
-        return detail::of(supple_turn_pulls(raw_, points.data(), moved.raw(), most));
+    status turn(scene of, span<const float> points, state moved, float *most = nullptr) const noexcept {
+        return detail::of(supple_turn_pulls(raw_, of.raw(), points.data(), moved.raw(), most));
     }
 
     // Where all are, how far from their targets, and the forces on the tissue.

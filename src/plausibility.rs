@@ -316,7 +316,7 @@ pub fn of_pull(held: impl Iterator<Item = Axes>, along: [f32; 3]) -> Option<Rema
 
 /// Calls `say` with a remark and the number of each pull that moves nothing.
 pub fn of_pulls<M>(scene: SceneView<'_, M>, pulls: &Pulls<'_>, mut say: impl FnMut(usize, Remark)) {
-    for (index, pull) in pulls.pulls().iter().enumerate() {
+    for (index, pull) in pulls.pulls().iter().enumerate().filter(|(_, pull)| pull.stiffness > 0.0) {
         let held = pulls.nodes_of(pull).iter().filter(|pulled| pulled.weight != 0.0);
         let held = held.map(|pulled| scene.held(pulled.node as usize));
         of_pull(held, pull.along).into_iter().for_each(|remark| say(index, remark));

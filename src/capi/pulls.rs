@@ -330,13 +330,15 @@ pub unsafe extern "C" fn supple_set_targets(
 
 /// Turns the points of pulls with the body, as it is in a state: a host calls it between frames, and before it settles. The
 /// nodes of a pull move its point by their mean. Near a surface, where they are all on one side of the point, its tissue
-/// moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart.
+/// moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart. A
+/// pull that is added to a body that has turned is turned by this, too.
 ///
 /// @param points of all nodes of the scene at rest, m, three coordinates each.
 /// @param most the largest change of a point, m; may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_turn_pulls(
     pulls: *mut supple_pulls,
+    scene: *const supple_scene,
     points: *const f32,
     state: *mut supple_state,
     most: *mut f32,
@@ -344,14 +346,16 @@ pub unsafe extern "C" fn supple_turn_pulls(
     // SAFETY: what the header asks of the caller.
     let turn = || unsafe {
         let (object, arrays) = memory::open(pulls)?;
-        let state = opened(state)?;
+        let (open, state) = (OpenScene::of(scene)?, opened(state)?);
+        open.fits(object.scene_nodes)?;
         if state.capacity() != object.scene_nodes as usize {
             return Err(mismatch(state.capacity(), object.scene_nodes as usize));
         }
         let points = array(points.cast::<[f32; 3]>(), object.scene_nodes as usize)?;
         let PullArrays { nodes, pulls, .. } = object.parts(arrays);
         let list = pulls.get_mut(..object.pulls as usize).unwrap_or_default();
-        let change = pulls::turn(points, state.displacements(), nodes, list);
+        let mass = |node: usize| open.view().node_mass(node);
+        let change = pulls::turn(points, mass, state.displacements(), nodes, list);
         if !most.is_null() {
             most.write(change);
         }

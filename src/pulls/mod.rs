@@ -5,7 +5,7 @@
 //! ```text
 //! p = k (y - x),  |p| <= f        along a direction n only: p = k n n . (y - x)
 //! ```
-//! shared among the nodes by their weights. The host sets targets, stiffnesses (0: absent) and limits whenever it likes.
+//! shared among the nodes by their weights. Where the body turns, `x0` goes along between calls ([`turn`]). The host sets targets, stiffnesses (0: absent) and limits whenever it likes.
 //!
 //! No stiffness makes a step unstable, and none lowers the critical step. Exact steps take the force at the end of the
 //! step, one pull after the other, from where the point would be without it, `z`:
@@ -192,8 +192,10 @@ impl Pull {
         if count == 0 || first.checked_add(count).is_none_or(|end| end > nodes) {
             return Err(PullError::Range { pull: index, first, count, nodes });
         }
-        let vectors = [("point", self.at), ("direction", self.along), ("target", self.from), ("target", self.to)];
-        for (what, vector) in vectors.into_iter().take(if self.to[0].is_nan() { 2 } else { 4 }) {
+        let (place, target) = ("point", "target");
+        let vectors =
+            [(place, self.at), (place, self.turned), ("direction", self.along), (target, self.from), (target, self.to)];
+        for (what, vector) in vectors.into_iter().take(if self.to[0].is_nan() { 3 } else { 5 }) {
             if let Some(&value) = vector.iter().find(|component| !is_bounded(**component)) {
                 return Err(PullError::Value { pull: index, what, value });
             }
@@ -381,6 +383,12 @@ impl fmt::Display for PullError {
             }
             Self::Value { pull, what: "most force", value } => {
                 write!(f, "pull {pull}: a most force of {value} N, it must be zero or more, infinite for no limit")
+            }
+            Self::Value { pull, what: "time", value } => {
+                write!(f, "pull {pull}: a time of {value} s, it must be a finite number")
+            }
+            Self::Value { what: "radius", value, .. } => {
+                write!(f, "a radius of {value} m, it must be a finite positive number")
             }
             Self::Value { pull, what, value } => {
                 write!(f, "pull {pull}: a component of its {what} is {value}, it must be a number up to {FARTHEST:e}")

@@ -196,7 +196,9 @@ impl<'w> Simulation<'w> {
     /// Turns the points of pulls with the body ([`turn`]), as a host does between frames of a body that turns. Gives the
     /// largest change, m.
     pub fn turn_pulls(&mut self) -> f32 {
-        turn(&self.points, self.state.displacements(), &self.pulled, &mut self.pulls)
+        let Self { scene, points, state, pulled, pulls, .. } = self;
+        let scene = scene.view();
+        turn(points, |node| scene.node_mass(node), state.displacements(), pulled, pulls)
     }
 
     /// Where the point of a pull is and how it is pulled. None if there is no such pull.

@@ -26,6 +26,8 @@ impl Simulation<'_> {
         most_steps: u32,
         threads: &impl Threads,
     ) -> Result<Settled, SimulationError> {
+        // What is refused turns nothing.
+        self.acting()?;
         self.turn_pulls();
         let Acting { mut loads, scene, state, .. } = self.acting()?;
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
@@ -50,10 +52,11 @@ impl Simulation<'_> {
     }
 
     /// Puts the nodes at these displacements (m, from rest), one for each, at a stop: velocities are zero and time stays
-    /// ([`tled::displace`]). Steps are prepared anew from there.
+    /// ([`tled::displace`]). Steps are prepared anew from there, and pulls turn ([`Simulation::turn_pulls`]).
     pub fn set_displacements(&mut self, metre: &[[f32; 3]]) -> Result<(), SimulationError> {
         let (scene, state) = self.parts_mut();
         tled::displace(scene, state, metre)?;
+        self.turn_pulls();
         self.forget_steps();
         Ok(())
     }

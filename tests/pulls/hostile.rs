@@ -24,7 +24,8 @@ fn what_cannot_be_is_refused_in_words() {
             "pull 1: a component of its target is 2000000, it must be a number up to 1e6",
         ),
         (Pull { along: [f32::NAN; 3], ..good }, "pull 1: a component of its direction is NaN"),
-        (Pull { times: [0.0, f64::NAN], ..good }, "pull 1: a component of its time is NaN"),
+        (Pull { times: [0.0, f64::NAN], ..good }, "pull 1: a time of NaN s, it must be a finite number"),
+        (Pull { turned: [0.0, f32::NAN, 0.0], ..good }, "pull 1: a component of its point is NaN"),
     ] {
         let told = refused(pull);
         assert!(told.starts_with(words), "{told}");

@@ -71,7 +71,7 @@ def test_a_part_of_the_surface_registers_without_pairs():
 
 
 def test_a_tumour_follows_tracked_points_over_openigtlink():
-    said = subprocess.run([sys.executable, ROOT / "tests" / "hosts" / "openigtlink_points_client.py"], capture_output=True, text=True)
+    said = subprocess.run([sys.executable, ROOT / "tests" / "hosts" / "openigtlink_points_client.py"], capture_output=True, text=True, timeout=120)
     print(said.stdout, said.stderr)
     assert said.returncode == 0 and "WRONG" not in said.stdout
 

@@ -26,7 +26,7 @@ def test_a_rigid_fit_finds_the_motion_and_says_what_it_lacks():
     seen[4] = np.nan
     for count in (6, 3):
         fit = supple.rigid_fit(points[:count], seen[:count])
-        assert np.allclose(fit.turn, turn) and np.allclose(fit(points), points @ turn.T + [1.0, 2.0, 3.0])
+        assert np.allclose(fit.rotation, turn) and np.allclose(fit(points), points @ turn.T + [1.0, 2.0, 3.0])
     assert np.allclose(fit.matrix() @ [*points[4], 1.0], [*fit(points[4]), 1.0])
     for given, words in [
         ((points[3:], seen[3:]), "2 of 3 points are seen, at least 3"),

@@ -90,19 +90,19 @@ class FollowedPoints:
 
 @dataclasses.dataclass(frozen=True)
 class Rigid:
-    """A rigid motion: `turn` (3, 3), then `shift` (m). Called with points (m, (n, 3)) it gives where they go."""
+    """A rigid motion: `rotation` (3, 3), then `translation` (m). Called with points (m, (n, 3)) it gives where they go."""
 
-    turn: NDArray[np.float64]
-    shift: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    translation: NDArray[np.float64]
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        moved: NDArray[np.float64] = np.asarray(points, np.float64) @ self.turn.T + self.shift
+        moved: NDArray[np.float64] = np.asarray(points, np.float64) @ self.rotation.T + self.translation
         return moved
 
     def matrix(self) -> NDArray[np.float64]:
         """Of shape (4, 4), in m."""
         made = np.eye(4)
-        made[:3, :3], made[:3, 3] = self.turn, self.shift
+        made[:3, :3], made[:3, 3] = self.rotation, self.translation
         return made
 
 
@@ -122,5 +122,5 @@ def rigid_fit(points: ArrayLike, seen: ArrayLike) -> Rigid:
         if width <= 1e-4 * length:
             raise InputError(f"rigid fit: the {len(a)} points that are seen lie on a line, one more off that line is needed")
     u, _, v = np.linalg.svd(from_a.T @ from_b)
-    turn = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v).T
-    return Rigid(turn, b.mean(axis=0) - turn @ a.mean(axis=0))
+    rotation = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v).T
+    return Rigid(rotation, b.mean(axis=0) - rotation @ a.mean(axis=0))

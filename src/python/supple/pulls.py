@@ -70,9 +70,10 @@ class PullMemory:
         status = lib.supple_set_targets(self.raw, library.pointer("float", rows), len(rows), *times, error)
         library.checked(status, error, "targets")
 
-    def turn(self, points: NDArray[np.float32], state: Any) -> None:
+    def turn(self, simulation: Simulation) -> None:
         """With the body."""
-        library.checked(lib.supple_turn_pulls(self.raw, library.pointer("float", points), state, ffi.NULL), what="pulls")
+        points = library.pointer("float", simulation.scene.mesh.points)
+        library.checked(lib.supple_turn_pulls(self.raw, simulation._raw_scene, points, simulation._state, ffi.NULL), what="pulls")
 
     def read(self, state: Any) -> NDArray[np.void]:
         found = np.zeros(self.count, _PULLED)

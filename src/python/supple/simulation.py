@@ -383,12 +383,6 @@ class Simulation:
         the body whenever targets move, and before it settles."""
         radius = _PATCH * self.scene._edge if radius is None else radius
         wanted = wanted_of(points, radius, stiffness, most, along)
-        made, outside = Pulls(self, wanted), self.locate(wanted.points).distances
-        if outside.max(initial=0.0) > 0.5 * radius:
-            warnings.warn(
-                f"pulls: point {outside.argmax()} is {1e3 * outside.max():.3g} mm outside the tissue: is it in metres, and in the axes of the mesh?",
-                RuntimeWarning, stacklevel=3,
-            )  # fmt: skip
         groups = [*self._pull_groups, wanted]
         if targets is not None:
             array = np.array(targets, np.float32)
@@ -396,12 +390,18 @@ class Simulation:
                 raise InputError(f"targets: their shape is {array.shape}, it must be {wanted.points.shape}")
             wanted.targets = array
         self._set_pulls(groups)
-        return made
+        outside = self.locate(wanted.points).distances
+        if outside.max(initial=0.0) > 0.5 * radius:
+            warnings.warn(
+                f"pulls: point {outside.argmax()} is {1e3 * outside.max():.3g} mm outside the tissue: is it in metres, and in the axes of the mesh?",
+                RuntimeWarning, stacklevel=3,
+            )  # fmt: skip
+        return Pulls(self, wanted)
 
     def _set_pulls(self, groups: list[Wanted]) -> None:
         memory = PullMemory(self, groups) if groups else None
         if memory:
-            memory.turn(self.scene.mesh.points, self._state)
+            memory.turn(self)
         library.checked(lib.supple_set_pulls(self._loads, memory.raw if memory else ffi.NULL), what="pulls")
         self._pull_memory, self._pull_groups = memory, groups
 
@@ -416,10 +416,10 @@ class Simulation:
         if not (np.isfinite(within) and within >= 0.0):
             raise InputError(f"within {within} s: it must be zero or more")
         assert self._pull_memory is not None
-        self._pull_memory.turn(self.scene.mesh.points, self._state)
         # A later move of one group goes on from where the targets of the others are.
         all_targets = [targets if group is wanted else group.targets for group in self._pull_groups]
         self._pull_memory.aim(np.concatenate(all_targets), (self.time, self.time + within))
+        self._pull_memory.turn(self)
         wanted.targets = targets
 
     @_one_at_a_time
@@ -587,7 +587,7 @@ class Simulation:
         self._warn_once()
         room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
         if self._pull_memory:
-            self._pull_memory.turn(self.scene.mesh.points, self._state)
+            self._pull_memory.turn(self)
         told = ffi.new("supple_settled *")
         status = lib.supple_sim_settle(self._sim, metre, int(most_steps), self._threads, room.pointer, room.size, told)
         library.checked(status, told.error, "settle")
@@ -696,6 +696,8 @@ class Simulation:
 
     def _prepare_again(self) -> None:
         """From the state as it is. Exact steps look at it by themselves."""
+        if self._pull_memory:
+            self._pull_memory.turn(self)
         if self.method != "exact":
             error = library.new_error()
             library.checked(lib.supple_sim_set(self._sim, self._settings, error), error, self.method)
