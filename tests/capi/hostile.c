@@ -557,7 +557,8 @@ static supple_status move_pulls(void) {
 }
 
 static supple_status read_pulls(supple_pulls *pulls, supple_state *state) {
-    if (one_in(2)) (void)supple_turn_pulls(pulls, one_in(60) ? NULL : points[0], state, NULL);
+    const supple_scene *scene = object(SCENE, 0);
+    if (one_in(2)) (void)supple_turn_pulls(pulls, scene, one_in(60) ? NULL : points_for(nodes_of(scene)), state, NULL);
     supple_pulled *out = end_of(&of_out, MOST_PULLS * sizeof *out);
     supple_status status = SUPPLE_E_MISMATCH;
     for (uint32_t count = 0; count <= MOST_PULLS && status == SUPPLE_E_MISMATCH; count++) {
