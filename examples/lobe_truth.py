@@ -1,5 +1,5 @@
-"""Truths for examples of registration: the lobe on a mesh of eight times as many elements, of another kind, with an exponential law, gravity,
-supports and loads, none of which the registration knows."""
+"""What examples of registration share: errors, points that are far from each other, and truths. A truth is the lobe on a mesh of eight times as
+many elements, of another kind, with an exponential law, gravity, supports and loads, none of which the registration knows."""
 
 import numpy as np
 import supple
@@ -18,6 +18,20 @@ def refined(mesh):
     eight += [(ab, bc, ac, ad), (ab, bd, bc, ad), (bc, cd, ac, ad), (bc, bd, cd, ad)]
     middles = mesh.points[unique].mean(axis=1)
     return supple.Mesh(np.concatenate([mesh.points, middles]), np.concatenate([np.stack(each, axis=1) for each in eight]))
+
+
+def spread(surface, first, count):
+    """Points of the surface, each as far as can be from those before."""
+    chosen, apart = [first], np.linalg.norm(surface - surface[first], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(apart.argmax()))
+        apart = np.minimum(apart, np.linalg.norm(surface - surface[chosen[-1]], axis=1))
+    return chosen
+
+
+def error(a, b):
+    """Mean distance, mm."""
+    return 1e3 * np.linalg.norm(a - b, axis=1).mean()
 
 
 def truth(mesh, state):

@@ -19,7 +19,7 @@ import matplotlib
 import numpy as np
 import SimpleITK as sitk
 import supple
-from lobe_truth import truth
+from lobe_truth import error, spread, truth
 from scipy.interpolate import RBFInterpolator
 
 matplotlib.use("Agg")
@@ -32,11 +32,6 @@ SPACING = 2.0  # mm, of the CT
 TUMOUR, RADIUS = np.array([0.005, 0.0, 0.032]), 0.008  # m
 random = np.random.default_rng(1)
 OUT.mkdir(parents=True, exist_ok=True)
-
-
-def millimetres(a, b):
-    """Mean distance."""
-    return 1e3 * np.linalg.norm(a - b, axis=1).mean()
 
 
 # %% The CT: tissue, vessels that branch from a trunk, a tumour; Hounsfield-like numbers. Mesh coordinates are LPS metres.
@@ -68,16 +63,13 @@ where = moved.locate(targets).positions.astype(float)
 
 # %% Points of the surface, far from each other, seen with an error.
 surface = mesh.points[np.unique(mesh.boundary())].astype(float)
-chosen = [0]
-for _ in range(19):
-    chosen.append(int(np.min(np.linalg.norm(surface[:, None] - surface[chosen], axis=2), axis=1).argmax()))
-tracked = surface[chosen]
+tracked = surface[spread(surface, 0, 20)]
 seen = moved.locate(tracked).positions + random.normal(0.0, ERROR, tracked.shape)
 
 
 # %% Registration: a rigid fit to begin with, then the points pull.
 body, followed = still, still.locate(targets)
-print(f"target registration error, mm: {millimetres(targets, where):.2f} not moved")
+print(f"target registration error, mm: {error(targets, where):.2f} not moved")
 for count in (6, 10, 20):
     at, to = tracked[:count], seen[:count]
     rigid = supple.rigid_fit(at, to)
@@ -87,7 +79,7 @@ for count in (6, 10, 20):
     begin = time.perf_counter()
     settled = body.settle(1e-4)
     took = time.perf_counter() - begin
-    errors = [millimetres(each, where) for each in (rigid(targets), targets + spline(targets), followed.positions)]
+    errors = [error(each, where) for each in (rigid(targets), targets + spline(targets), followed.positions)]
     print("{} points: rigid {:.2f}, thin-plate spline {:.2f}, supple {:.2f}".format(count, *errors), end="; ")
     print(f"{settled.steps} steps, {1e3 * took:.0f} ms, {settled.status}")
     if count < 20:
@@ -99,7 +91,7 @@ wrong[7] += [0.0, 0.015, 0.0]
 pulls.move(wrong)
 body.settle(1e-4)
 gaps = 1e3 * np.linalg.norm(pulls.gaps, axis=1)
-print(f"one point 15 mm off: {millimetres(followed.positions, where):.2f} mm; its gap {gaps[7]:.1f} mm, others at most {np.delete(gaps, 7).max():.1f} mm")
+print(f"one point 15 mm off: {error(followed.positions, where):.2f} mm; its gap {gaps[7]:.1f} mm, others at most {np.delete(gaps, 7).max():.1f} mm")
 pulls.move(seen)
 body.settle(1e-4)
 

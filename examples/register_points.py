@@ -12,25 +12,11 @@ import pathlib
 
 import numpy as np
 import supple
-from lobe_truth import STATES, truth
+from lobe_truth import STATES, error, spread, truth
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 ERROR, WRONG, STIFFNESS = 0.0005, 0.015, 1000.0  # m an axis, m, N/m
-
-
-def spread(surface, first, count):
-    """Points of the surface, each as far as can be from those before."""
-    chosen, apart = [first], np.linalg.norm(surface - surface[first], axis=1)
-    while len(chosen) < count:
-        chosen.append(int(apart.argmax()))
-        apart = np.minimum(apart, np.linalg.norm(surface - surface[chosen[-1]], axis=1))
-    return chosen
-
-
-def error(a, b):
-    """Mean distance, mm."""
-    return 1e3 * np.linalg.norm(a - b, axis=1).mean()
 
 
 def errors_of(body, moved, count, wrong, seed):

@@ -13,7 +13,7 @@ import pathlib
 
 import numpy as np
 import supple
-from lobe_truth import STATES, truth
+from lobe_truth import STATES, error, truth
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import cKDTree
 
@@ -57,11 +57,6 @@ def rigid_icp(mesh, cloud, begin):
     for _ in range(50):
         begin = supple.rigid_fit(at[cKDTree(begin(at)).query(cloud)[1]], cloud)
     return begin
-
-
-def error(a, b):
-    """Mean distance, mm."""
-    return 1e3 * np.linalg.norm(a - b, axis=1).mean()
 
 
 def seen_of(moved, part, random):

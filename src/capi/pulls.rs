@@ -93,6 +93,17 @@ impl supple_pulls {
             }
         }
     }
+
+    /// A state with as many nodes as the scene of these pulls.
+    ///
+    /// # Safety
+    /// As at [`opened`].
+    unsafe fn state<'a>(&self, state: *mut supple_state) -> Answer<StateView<'a>> {
+        // SAFETY: the caller's promise.
+        let state = unsafe { opened(state)? };
+        let (nodes, needed) = (state.capacity(), self.scene_nodes as usize);
+        if nodes == needed { Ok(state) } else { Err(mismatch(nodes, needed)) }
+    }
 }
 
 /// Bytes of memory that so many pulls need, of so many nodes in sum. SUPPLE_PULLS_SIZE is the same as a constant.
@@ -346,11 +357,8 @@ pub unsafe extern "C" fn supple_turn_pulls(
     // SAFETY: what the header asks of the caller.
     let turn = || unsafe {
         let (object, arrays) = memory::open(pulls)?;
-        let (open, state) = (OpenScene::of(scene)?, opened(state)?);
+        let (open, state) = (OpenScene::of(scene)?, object.state(state)?);
         open.fits(object.scene_nodes)?;
-        if state.capacity() != object.scene_nodes as usize {
-            return Err(mismatch(state.capacity(), object.scene_nodes as usize));
-        }
         let points = array(points.cast::<[f32; 3]>(), object.scene_nodes as usize)?;
         let PullArrays { nodes, pulls, .. } = object.parts(arrays);
         let list = pulls.get_mut(..object.pulls as usize).unwrap_or_default();
@@ -376,10 +384,7 @@ pub unsafe extern "C" fn supple_read_pulls(
     // SAFETY: what the header asks of the caller.
     let read = || unsafe {
         let (object, arrays) = memory::open(pulls)?;
-        let state = opened(state)?;
-        if state.capacity() != object.scene_nodes as usize {
-            return Err(mismatch(state.capacity(), object.scene_nodes as usize));
-        }
+        let state = object.state(state)?;
         if count != object.pulls {
             return Err(mismatch(count as usize, object.pulls as usize));
         }

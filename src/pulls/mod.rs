@@ -159,6 +159,12 @@ impl Pull {
         from + share * (to - from)
     }
 
+    /// Its nodes in the list of those of all pulls.
+    fn among<'a>(&self, nodes: &'a [PulledNode]) -> &'a [PulledNode] {
+        let [first, count] = self.nodes.map(|number| number as usize);
+        nodes.get(first..first.saturating_add(count)).unwrap_or_default()
+    }
+
     /// Where its point would be if its nodes had turned only, m.
     pub(crate) fn unmoved(&self) -> Vec3 {
         Vec3::from_array(self.at) + Vec3::from_array(self.turned)
@@ -284,8 +290,7 @@ impl<'a> Pulls<'a> {
 
     /// The nodes of a pull.
     pub(crate) fn nodes_of(&self, pull: &Pull) -> &'a [PulledNode] {
-        let [first, count] = pull.nodes.map(|number| number as usize);
-        self.nodes.get(first..first.saturating_add(count)).unwrap_or_default()
+        pull.among(self.nodes)
     }
 
     /// Where the point of a pull is at a time (s) with these displacements of the nodes (m), and how it was pulled in the
@@ -302,8 +307,12 @@ impl<'a> Pulls<'a> {
 
     /// The mean of a vector over the nodes of a pull, by their weights.
     pub(crate) fn mean(&self, pull: &Pull, of_node: impl Fn(usize) -> Vec3) -> Vec3 {
-        self.nodes_of(pull).iter().map(|pulled| pulled.weight * of_node(pulled.node as usize)).sum()
+        mean(self.nodes_of(pull), of_node)
     }
+}
+
+fn mean(nodes: &[PulledNode], of_node: impl Fn(usize) -> Vec3) -> Vec3 {
+    nodes.iter().map(|pulled| pulled.weight * of_node(pulled.node as usize)).sum()
 }
 
 /// Why a pull was refused.

@@ -9,7 +9,7 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 
-use super::{Pull, PulledNode};
+use super::{Pull, PulledNode, mean};
 use crate::simd::NodeVector;
 
 /// Times that a matrix is squared to find its largest eigenvector: enough for one larger by a millionth than the others.
@@ -43,11 +43,8 @@ pub fn turn(
     }
     let (rotation, mut most) = (rotation_of(spread).as_quat(), 0.0_f32);
     for pull in pulls {
-        let [first, count] = pull.nodes.map(|number| number as usize);
-        let own = nodes.get(first..).and_then(|nodes| nodes.get(..count)).unwrap_or_default();
-        let place =
-            |pulled: &PulledNode| points.get(pulled.node as usize).map(|at| pulled.weight * Vec3::from_array(*at));
-        let arm = Vec3::from_array(pull.at) - own.iter().filter_map(place).sum::<Vec3>();
+        let place = |node: usize| points.get(node).copied().unwrap_or_default().into();
+        let arm = Vec3::from_array(pull.at) - mean(pull.among(nodes), place);
         let turned = rotation * arm - arm;
         let change = turned.distance(Vec3::from_array(pull.turned));
         if change.is_finite() {
