@@ -13,9 +13,9 @@ use core::ops::{Deref, Range};
 
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
-    VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
+    Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
-use crate::material::{Element, Law, Laws, Material, Moduli};
+use crate::material::{Element, Law, Laws, Material, Moduli, Prony};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
@@ -89,6 +89,8 @@ pub struct SceneFacts {
     checksum: u32,
     /// Whether a node's mass may be more than that of the tissue around it.
     has_point_masses: bool,
+    /// Terms of the tissue that relaxes with most.
+    terms: usize,
 }
 
 impl SceneFacts {
@@ -102,6 +104,7 @@ impl SceneFacts {
         rounding_energy: 0.0,
         checksum: 0,
         has_point_masses: false,
+        terms: 0,
     };
 
     /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]) and for nodal strain `patches`
@@ -201,6 +204,7 @@ impl SceneFacts {
             rounding_energy,
             checksum,
             has_point_masses: false,
+            terms: material.prony().iter().map(Prony::terms).max().unwrap_or(0),
         })
     }
 
@@ -466,6 +470,41 @@ impl<'a, M: Material> SceneView<'a, M> {
     /// What internal forces are computed from.
     pub(crate) fn elements(&self) -> Elements<'a, M::Law> {
         Elements { laws: self.material.laws(), tiles: self.tiles, partitions: &self.facts.partitions }
+    }
+
+    /// Tiles of what relaxes: elements, or with nodal strain patches.
+    fn relaxing_tiles(&self) -> usize {
+        if self.element().is_nodal_strain() { self.patches.tiles().len() } else { self.tiles.len() }
+    }
+
+    /// The same of the elements or patches whose first partition is one of these.
+    pub(crate) fn relaxing_tiles_of(&self, partitions: &Range<usize>) -> Range<usize> {
+        let patches = self.element().is_nodal_strain();
+        if patches { self.patches.tiles_of(partitions) } else { self.facts.partitions.tiles_of(partitions) }
+    }
+
+    /// Vectors of the memory of a tile, one copy.
+    pub(crate) fn vectors_of_tile(&self) -> usize {
+        // Without a look at the facts where no tissue can relax: its kernels are then left out.
+        if self.material.prony().is_empty() { 0 } else { VECTORS_OF_TERM * self.facts.terms }
+    }
+
+    /// Vectors that a state keeps for tissue that relaxes ([`StateView::remembering`](crate::state::StateView::remembering)).
+    #[must_use]
+    pub fn memory_vectors(&self) -> usize {
+        2 * self.relaxing_tiles() * self.vectors_of_tile()
+    }
+
+    /// How tissue relaxes from the middle of the last step to that of the next, in step `step`; nothing if none does.
+    pub(crate) fn series(&self, halves: [f32; 2], step: u64) -> Option<Series<'a>> {
+        if self.vectors_of_tile() == 0 {
+            return None;
+        }
+        let of_element = match self.material.laws() {
+            Laws::One(_) => &[],
+            Laws::Regions { of_element, .. } => of_element,
+        };
+        Some(Series { tissues: self.material.prony(), of_element, terms: self.facts.terms, halves, step })
     }
 
     /// Fields of every element, in the order of the tables, under the given displacements (m).

@@ -16,7 +16,11 @@ use crate::copy::copy;
 use crate::element::{Extremes, forget_crushed};
 use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
+#[cfg(any(feature = "std", test))]
+use crate::material::Material;
 use crate::scattered::scattered;
+#[cfg(any(feature = "std", test))]
+use crate::scene::SceneView;
 pub use crate::simd::NodeVector;
 
 /// The velocity (m/s) of an increment (m) over a step of so many seconds; zero before the first step. A number, however short
@@ -40,6 +44,10 @@ pub struct Progress {
     pub(crate) dt: f32,
     /// At the start of the latest step.
     pub(crate) extremes: Extremes<f32>,
+    /// Time of what tissue remembers before that of the state, s: half the last step.
+    pub(crate) half: f32,
+    /// Which of the two copies of what it remembers is that of now.
+    pub(crate) second: bool,
     /// Steps keep it, and copies have it; a state that was restored, reset or put has none.
     pub(crate) seen: Option<Mark>,
 }
@@ -86,12 +94,13 @@ impl Progress {
 
     /// At rest, at time zero.
     pub const START: Self =
-        Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST, seen: None };
+        Self::resumed(0.0, 0, 0.0, EnergyBalance::NEW);
 
     /// A simulation that goes on from here; its displacements, remainders and increments are the caller's to restore.
     #[must_use]
     pub const fn resumed(time: f64, steps: u64, last_step: f32, energy_balance: EnergyBalance) -> Self {
-        Self { time, steps, energy_balance, dt: last_step, extremes: Extremes::REST, seen: None }
+        let (half, extremes) = (0.5 * last_step, Extremes::REST);
+        Self { time, steps, energy_balance, dt: last_step, extremes, half, second: false, seen: None }
     }
 
     /// Length of the step that the last increment spans, s; zero before the first step.
@@ -153,6 +162,8 @@ pub struct StateView<'a> {
     pub(crate) pushes: &'a mut [NodeVector],
     /// Forces of the pulls in the latest step, N.
     pub(crate) pulls: &'a mut [NodeVector],
+    /// What tissue remembers, twice.
+    pub(crate) memory: &'a mut [NodeVector],
 }
 
 impl Deref for StateView<'_> {
@@ -177,7 +188,8 @@ impl<'a> StateView<'a> {
         progress: &'a mut Progress,
     ) -> Self {
         let (touches, points, pushes): (&mut [_], &mut [_], &mut [_]) = (&mut [], &mut [], &mut []);
-        Self { displacement, remainder, increment, force, volume, progress, touches, points, pushes, pulls: &mut [] }
+        let (pulls, memory): (&mut [_], &mut [_]) = (&mut [], &mut []);
+        Self { displacement, remainder, increment, force, volume, progress, touches, points, pushes, pulls, memory }
     }
 
     /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest
@@ -209,6 +221,13 @@ impl<'a> StateView<'a> {
         Self { pulls: forces, ..self }
     }
 
+    /// The same state with [`SceneView::memory_vectors`](crate::scene::SceneView::memory_vectors) vectors that belong to
+    /// it, for tissue that relaxes. Zeros: nothing has been deformed so far.
+    #[must_use]
+    pub fn remembering(self, memory: &'a mut [NodeVector]) -> Self {
+        Self { memory, ..self }
+    }
+
     /// The same state for a shorter time.
     pub const fn reborrow(&mut self) -> StateView<'_> {
         StateView {
@@ -222,6 +241,7 @@ impl<'a> StateView<'a> {
             points: self.points,
             pushes: self.pushes,
             pulls: self.pulls,
+            memory: self.memory,
         }
     }
 
@@ -281,35 +301,50 @@ impl<'a> StateView<'a> {
             [displacement.0, increment.0] = at(node).map(|[x, y, z]| [x, y, z, 0.0]);
         }
         self.remainder.fill(NodeVector::ZERO);
+        self.memory.fill(NodeVector::ZERO);
         (self.progress.time, self.progress.dt, self.progress.seen) = (time, seconds, None);
         forget_crushed(self.volume);
     }
 
-    /// Copies the vectors that a step moves to [`MOVED_VECTORS`] for each node.
-    pub(crate) fn save(&self, into: &mut [NodeVector]) {
-        let room = (into.len() / MOVED_VECTORS).max(1);
-        for (saved, vectors) in into.chunks_exact_mut(room).zip([&*self.displacement, self.remainder, self.increment]) {
+    /// What tissue remembers, and where the next step writes it.
+    pub(crate) fn copies_of_memory(&mut self) -> [&mut [NodeVector]; 2] {
+        copies_of(self.memory, self.progress)
+    }
+
+    /// Copies the vectors that a step moves to [`MOVED_VECTORS`] for each of so many nodes, and what tissue remembers.
+    pub(crate) fn save(&mut self, nodes: usize, into: &mut [NodeVector]) {
+        let (moved, remembered) = into.split_at_mut((MOVED_VECTORS * nodes).min(into.len()));
+        let vectors = [&*self.displacement, self.remainder, self.increment];
+        for (saved, vectors) in moved.chunks_exact_mut(nodes.max(1)).zip(vectors) {
             copy(saved, vectors);
         }
+        copy(remembered, self.copies_of_memory()[0]);
     }
 
     /// Copies them back.
-    pub(crate) fn restore(&mut self, from: &[NodeVector]) {
+    pub(crate) fn restore(&mut self, nodes: usize, from: &[NodeVector]) {
+        let (moved, remembered) = from.split_at((MOVED_VECTORS * nodes).min(from.len()));
         let Self { displacement, remainder, increment, .. } = self;
-        let room = (from.len() / MOVED_VECTORS).max(1);
-        for (vectors, saved) in [displacement, remainder, increment].into_iter().zip(from.chunks_exact(room)) {
+        for (vectors, saved) in [displacement, remainder, increment].into_iter().zip(moved.chunks_exact(nodes.max(1))) {
             copy(vectors, saved);
         }
+        copy(self.copies_of_memory()[0], remembered);
     }
 
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
-        let Self { displacement, remainder, increment, force, .. } = self;
-        for vectors in [displacement, remainder, increment, force] {
+        let Self { displacement, remainder, increment, force, memory, .. } = self;
+        for vectors in [displacement, remainder, increment, force, memory] {
             vectors.fill(NodeVector::ZERO);
         }
         *self.progress = Progress::START;
     }
+}
+
+/// What tissue remembers at the moment of a state, and where the next step writes it.
+pub(crate) fn copies_of<'a>(memory: &'a mut [NodeVector], progress: &Progress) -> [&'a mut [NodeVector]; 2] {
+    let (first, second) = memory.split_at_mut(memory.len() / 2);
+    if progress.second { [second, first] } else { [first, second] }
 }
 
 /// What can be seen as a state.
@@ -341,6 +376,8 @@ pub struct InstrumentMemory<'a> {
     pub touches: &'a mut [Touch],
     /// See [`StateView::pulling`].
     pub pulls: &'a mut [NodeVector],
+    /// See [`StateView::remembering`].
+    pub memory: &'a mut [NodeVector],
 }
 
 /// A state that owns its vectors.
@@ -361,10 +398,10 @@ impl<S> Deref for State<S> {
 impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
-        let ([displacement, remainder, increment, force, volume], InstrumentMemory { pushes, touches, pulls }) =
+        let ([displacement, remainder, increment, force, volume], InstrumentMemory { pushes, touches, pulls, memory }) =
             self.vectors.vectors_mut();
         let state = StateView::new(displacement, remainder, increment, force, volume, &mut self.progress);
-        state.pushing(pushes).feeling(touches).pulling(pulls)
+        state.pushing(pushes).feeling(touches).pulling(pulls).remembering(memory)
     }
 
     /// Displacement of each node, m.
@@ -455,6 +492,7 @@ pub struct VecVectors {
     pushes: std::vec::Vec<NodeVector>,
     touches: std::vec::Vec<Touch>,
     pulls: std::vec::Vec<NodeVector>,
+    memory: std::vec::Vec<NodeVector>,
 }
 
 #[cfg(any(feature = "std", test))]
@@ -464,8 +502,8 @@ impl StateVectors for VecVectors {
     }
 
     fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>) {
-        let Self { vectors, pushes, touches, pulls } = self;
-        (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches, pulls })
+        let Self { vectors, pushes, touches, pulls, memory } = self;
+        (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches, pulls, memory })
     }
 }
 
@@ -480,8 +518,16 @@ impl VecState {
     pub fn at_rest(nodes: usize) -> Self {
         let zero = || std::vec![NodeVector::ZERO; nodes];
         let vectors = [zero(), zero(), zero(), zero(), zero()];
-        let (pushes, touches, pulls) = (std::vec![], std::vec![], std::vec![]);
-        Self { vectors: VecVectors { vectors, pushes, touches, pulls }, progress: Progress::START }
+        let (pushes, touches, pulls, memory) = (std::vec![], std::vec![], std::vec![], std::vec![]);
+        Self { vectors: VecVectors { vectors, pushes, touches, pulls, memory }, progress: Progress::START }
+    }
+
+    /// The same with room for what a scene's tissue remembers ([`StateView::remembering`]).
+    #[must_use]
+    pub fn of<M: Material>(scene: SceneView<'_, M>) -> Self {
+        let mut state = Self::at_rest(scene.node_count());
+        state.vectors.memory = std::vec![NodeVector::ZERO; scene.memory_vectors()];
+        state
     }
 
     /// The same with room for what instruments do on a surface.

@@ -56,7 +56,7 @@ pub(crate) fn vectors_with<M: Material>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
-    Ok(vectors_for_pace(scene.node_count()) + of_method + guard::vectors_for(scene, points)?)
+    Ok(vectors_for_pace(scene.node_count(), scene.memory_vectors()) + of_method + guard::vectors_for(scene, points)?)
 }
 
 /// What chooses the length of the steps.
@@ -67,6 +67,8 @@ pub(crate) struct Chooser {
     /// Of exact steps.
     pace: Pace,
     nodes: usize,
+    /// Vectors of what tissue remembers.
+    memory: usize,
     /// Vectors of the first run's inertia.
     vectors: usize,
 }
@@ -152,6 +154,7 @@ impl Chooser {
             control: Control::new(request.tolerance, lengths, request.longest.damping()),
             pace: Pace::new(critical),
             nodes: scene.node_count(),
+            memory: scene.memory_vectors(),
             vectors: vectors_for_method(method, scene, points)?,
             request,
         })
@@ -170,7 +173,7 @@ impl Chooser {
     }
 
     fn parts<'a>(&self, storage: &'a mut [NodeVector]) -> Option<StorageParts<'a>> {
-        let (kept, rest) = storage.split_at_mut_checked(vectors_for_pace(self.nodes))?;
+        let (kept, rest) = storage.split_at_mut_checked(vectors_for_pace(self.nodes, self.memory))?;
         let (first, second) = rest.split_at_mut_checked(self.vectors)?;
         Some(StorageParts { kept, first, second })
     }

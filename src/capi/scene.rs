@@ -173,7 +173,7 @@ mod contents {
     impl<'a> SceneMaterial<'a> {
         const fn any(&self) -> AnyMaterial<'a, SceneLaw> {
             let Self { element, law, tissues, of_element } = *self;
-            AnyMaterial { element, law, tissues, of_element }
+            AnyMaterial { element, law, tissues, of_element, prony: &[] }
         }
     }
 

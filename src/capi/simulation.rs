@@ -460,7 +460,7 @@ fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize 
     let cells = if settings.cells == [0; 3] { Cells::Suggested } else { Cells::Given(settings.cells) };
     let of_method = vectors_at_most(element, node_count, element_count, cells);
     let of_guard = guard_vectors(element, node_count, element_count);
-    let of_pace = vectors_for_pace(node_count);
+    let of_pace = vectors_for_pace(node_count, 0);
     let arrays = |count| Layout::of::<supple_sim>().and::<NodeVector>(count).bytes();
     let steps = match settings.steps {
         SUPPLE_STEPS_EXACT => arrays(of_pace),
@@ -724,7 +724,7 @@ unsafe fn needed(
             }
             Ok::<_, supple_error>(request)
         };
-        let pace = vectors_for_pace(nodes) * size_of::<NodeVector>();
+        let pace = vectors_for_pace(nodes, 0) * size_of::<NodeVector>();
         let exact = |damping| Pace::of(settings.given_seconds(), damping, critical).map(|_| pace);
         let steps = match settings.steps {
             SUPPLE_STEPS_EXACT => exact(settings.damping)?,
@@ -761,7 +761,7 @@ unsafe fn made(
         let large = settings.large(seconds);
         let exact = |room: &mut Room, damping| {
             let pace = Pace::of(settings.given_seconds(), damping, critical)?;
-            Ok::<_, supple_error>(Exact { pace, damping, kept: room.vectors(vectors_for_pace(points.len()))? })
+            Ok::<_, supple_error>(Exact { pace, damping, kept: room.vectors(vectors_for_pace(points.len(), 0))? })
         };
         let guarded = |room: &mut Room, seconds, damping, every| {
             if !settings.is_guarded() {
@@ -814,7 +814,7 @@ impl Prepared {
             let nodes = (*sim).nodes;
             let at = |place: usize| sim.cast::<u8>().add(place);
             let exact = |Exact { pace, damping, kept }: &'a mut Exact| {
-                let count = vectors_for_pace(nodes as usize);
+                let count = vectors_for_pace(nodes as usize, 0);
                 let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), count);
                 ExactSteps::Paced { pace, kept, damping: *damping }
             };

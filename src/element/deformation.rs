@@ -130,6 +130,14 @@ impl<R: Real> Deformation<R> {
         if i == j { rest + (R::splat(1.0) + self.trace) } else { rest }
     }
 
+    /// `cof F - I`, to full relative accuracy.
+    #[inline(always)]
+    pub(super) fn cofactor_change(&self, i: usize, j: usize) -> R {
+        let (i, j) = (i % 3, j % 3);
+        let rest = self.cof_h[i][j] - self.h[j][i];
+        if i == j { rest + self.trace } else { rest }
+    }
+
     /// `F F^T`.
     #[inline(always)]
     pub(super) fn left_cauchy_green(&self) -> Symmetric<R> {

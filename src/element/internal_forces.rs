@@ -4,7 +4,7 @@
 
 use core::ops::Range;
 
-use crate::material::{Invariants, Law, LawState, Laws, response_operations};
+use crate::material::{AnyLaw, Invariants, Law, LawState, Laws, response_operations};
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
@@ -15,6 +15,7 @@ use crate::simd::{
 use super::ElementTile;
 use super::deformation::{Deformation, LeftOut, Matrix, edges};
 use super::pressure::{OwnPressure, Pressure};
+use super::relaxation::{Elastic, Past};
 
 /// The elements of a scene with their laws.
 #[derive(Clone, Copy)]
@@ -97,7 +98,7 @@ impl ElementVisitor for NoVisitor {
 }
 
 /// The kernel that adds internal forces to the nodes of some partitions, in the order of the elements.
-pub struct InternalForces<'a, L, V, P = OwnPressure> {
+pub struct InternalForces<'a, L, V, P = OwnPressure, K = Elastic> {
     elements: Elements<'a, L>,
     pressure: P,
     /// Forces of the nodes in these partitions are computed.
@@ -107,6 +108,7 @@ pub struct InternalForces<'a, L, V, P = OwnPressure> {
     remainder: Gather<'a>,
     force: Scatter<'a>,
     visitor: V,
+    past: K,
 }
 
 impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
@@ -122,46 +124,55 @@ impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
     ) -> Self {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
         let [displacement, remainder] = moved.map(Gather::new);
-        Self { elements, pressure, partitions, displacement, remainder, force, visitor }
+        Self { elements, pressure, partitions, displacement, remainder, force, visitor, past: Elastic }
     }
 }
 
-impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V, P> {
+impl<'a, L: Law + Into<AnyLaw>, V, P> InternalForces<'a, L, V, P> {
+    /// The same for tissue that knows more of the past.
+    pub(crate) fn with_past<K>(self, past: K) -> InternalForces<'a, AnyLaw, V, P, K> {
+        let Self { elements: Elements { laws, tiles, partitions: all }, pressure, partitions, .. } = self;
+        let Self { displacement, remainder, force, visitor, .. } = self;
+        let elements = Elements { laws: laws.any(), tiles, partitions: all };
+        InternalForces { elements, pressure, partitions, displacement, remainder, force, visitor, past }
+    }
+}
+
+impl<L: Law, V: ElementVisitor, P: Pressure, K: Past> Kernel for InternalForces<'_, L, V, P, K> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        if R::COUNT > 8 { in_batches::<R, L, P, WIDE_BATCH>(self) } else { in_batches::<R, L, P, BATCH>(self) }
+        if R::COUNT > 8 { in_batches::<R, L, P, K, WIDE_BATCH>(self) } else { in_batches::<R, L, P, K, BATCH>(self) }
     }
 
     #[inline(always)]
     fn run_scalar(self) -> Extremes<f32> {
-        in_batches::<f32, L, P, SCALAR_BATCH>(self)
+        in_batches::<f32, L, P, K, SCALAR_BATCH>(self)
     }
 }
 
 #[inline(always)]
-fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
-    kernel: InternalForces<'_, L, impl ElementVisitor, P>,
+fn in_batches<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
+    kernel: InternalForces<'_, L, impl ElementVisitor, P, K>,
 ) -> Extremes<f32> {
-    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, mut visitor } = kernel;
+    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, visitor, past } = kernel;
     let Elements { laws, tiles, partitions: all } = elements;
     let displacement = pressure.displacement().unwrap_or(displacement);
-    let mut extremes = Extremes::<Pair<R>>::none();
+    let (mut extremes, mut asked) = (Extremes::<Pair<R>>::none(), (visitor, past));
     for (touching, length) in all.touching(partitions) {
         let tiles = (tiles.get(touching).unwrap_or_default(), length);
         let input = (displacement, remainder, pressure);
-        add_forces::<R, L, P, SIZE>(&laws, tiles, input, &mut force, &mut visitor, &mut extremes);
+        add_forces::<R, L, P, K, SIZE>(&laws, tiles, input, &mut force, &mut asked, &mut extremes);
     }
     Extremes::none().merged_with(&extremes)
 }
 
 /// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
 /// them.
-#[derive(Clone, Copy)]
-struct ElementVector<'a, R> {
+struct ElementVector<'a, R: Real, K: Past> {
     tile: &'a ElementTile,
     first: usize,
     /// Displacement gradient.
@@ -174,15 +185,26 @@ struct ElementVector<'a, R> {
     s: R,
     /// Fourth component of the forces.
     fourth: R,
+    /// What the past needs to know of the law.
+    local: K::Local<R>,
 }
 
-impl<'a, R: Real> ElementVector<'a, R> {
+impl<R: Real, K: Past> Clone for ElementVector<'_, R, K> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R: Real, K: Past> Copy for ElementVector<'_, R, K> {}
+
+impl<'a, R: Real, K: Past> ElementVector<'a, R, K> {
     #[inline(always)]
     fn zero(tile: &'a ElementTile) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
         let h = [[zero; 3]; 3];
-        Self { tile, first: 0, h, invariants, change: zero, p1: zero, s: zero, fourth: zero }
+        Self { tile, first: 0, h, invariants, change: zero, p1: zero, s: zero, fourth: zero, local: K::at_rest() }
     }
 }
 
@@ -200,17 +222,17 @@ const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 /// A batch of a few vectors of elements goes through three passes: deformation, law, scatter. The law is a long
 /// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]).
 #[inline(always)]
-pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
+pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
     laws: &Laws<'_, L>,
     (tiles, length): (&[ElementTile], usize),
     input: (Gather<'_>, Gather<'_>, P),
     force: &mut Scatter<'_>,
-    visitor: &mut impl ElementVisitor,
+    (visitor, past): &mut (impl ElementVisitor, K),
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = tiles.first() else { return };
     let (displacement, remainder, pressure) = input;
-    let mut batch = [ElementVector::<R>::zero(first); SIZE];
+    let mut batch = [ElementVector::<R, K>::zero(first); SIZE];
     let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
     let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
     for start in (0..strip_count).step_by(most) {
@@ -219,10 +241,13 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
         R::run_piece(Deform { tiles, length, strips, displacement, remainder, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
-            let locals = respond::<R, L>(laws, pair, extremes);
+            let locals = respond::<R, L, K>(laws, pair, extremes);
             for (elements, local) in pair.iter_mut().zip(&locals).take(count - 2 * index) {
-                visit::<R, L>(laws, elements, local, visitor);
+                visit::<R, L, K>(laws, elements, local, visitor);
             }
+        }
+        if K::REMEMBERS {
+            R::run_piece(Relax { batch: batch.get_mut(..count).unwrap_or_default(), past: &mut *past });
         }
         let batch = batch.get(..count).unwrap_or_default();
         R::run_piece(AddForces { batch, length, force: force.reborrow() });
@@ -240,7 +265,7 @@ pub(super) fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K])
 }
 
 /// The first pass: deformation of the elements of some strips.
-struct Deform<'a, 'b, R: Real, P: Pressure> {
+struct Deform<'a, 'b, R: Real, P: Pressure, K: Past> {
     tiles: &'a [ElementTile],
     /// Elements of a strip.
     length: usize,
@@ -248,25 +273,25 @@ struct Deform<'a, 'b, R: Real, P: Pressure> {
     displacement: Gather<'b>,
     remainder: Gather<'b>,
     pressure: P,
-    batch: &'b mut [ElementVector<'a, R>],
+    batch: &'b mut [ElementVector<'a, R, K>],
 }
 
-impl<R: Real, P: Pressure> Piece for Deform<'_, '_, R, P> {
+impl<R: Real, P: Pressure, K: Past> Piece for Deform<'_, '_, R, P, K> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         match self.length {
-            3 => deform::<R, P, 3, 6>(self),
-            2 => deform::<R, P, 2, 5>(self),
-            _ => deform::<R, P, 1, 4>(self),
+            3 => deform::<R, P, K, 3, 6>(self),
+            2 => deform::<R, P, K, 2, 5>(self),
+            _ => deform::<R, P, K, 1, 4>(self),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes. Elements of tiles with nodes out of range do not deform.
 #[inline(always)]
-fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P>) {
+fn deform<R: Real, P: Pressure, S: Past, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P, S>) {
     let Deform { tiles, strips, displacement, remainder, pressure, batch, .. } = pass;
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
@@ -301,9 +326,9 @@ fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_,
 
 /// The second pass: the stress of the law.
 #[inline(always)]
-fn respond<R: Real, L: Law>(
+fn respond<R: Real, L: Law, K: Past>(
     laws: &Laws<'_, L>,
-    pair: &mut [ElementVector<'_, R>; 2],
+    pair: &mut [ElementVector<'_, R, K>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [LawState<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
@@ -327,23 +352,47 @@ fn respond<R: Real, L: Law>(
 
 /// Calls the visitor.
 #[inline(always)]
-fn visit<R: Real, L: Law>(
+fn visit<R: Real, L: Law, K: Past>(
     laws: &Laws<'_, L>,
-    elements: &mut ElementVector<'_, R>,
+    elements: &mut ElementVector<'_, R, K>,
     local: &LawState<R>,
     visitor: &mut impl ElementVisitor,
 ) {
     let law = laws.widen(|lane| elements.tile.element(elements.first + lane));
     let deformation = Deformation::with(elements.h, elements.invariants);
-    elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
+    let ElementVector { tile, first, .. } = *elements;
+    elements.fourth = visitor.visit::<R, L>(&law, tile, first, &deformation, local);
+    elements.local = K::of_law(local);
+}
+
+/// Between the second and the third pass, for tissue that remembers: its stress takes the place of `h`.
+struct Relax<'a, 'b, R: Real, K: Past> {
+    batch: &'a mut [ElementVector<'b, R, K>],
+    past: &'a mut K,
+}
+
+impl<R: Real, K: Past> Piece for Relax<'_, '_, R, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { batch, past } = self;
+        for elements in batch {
+            let ElementVector { tile, first, p1, s, ref local, .. } = *elements;
+            let deformation = Deformation::with(elements.h, elements.invariants);
+            let element = |lane: usize| tile.element(first + lane);
+            elements.h = past.stress((tile, first), element, &deformation, [p1, s], local);
+        }
+    }
 }
 
 /// Nodal forces from the stress, with the fourth component of the visitor.
 #[inline(always)]
-fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
-    let ElementVector { tile, first, .. } = *elements;
-    let deformation = Deformation::with(elements.h, elements.invariants);
-    let stress = deformation.stress(elements.p1, elements.s);
+fn nodal_forces<R: Real, K: Past>(elements: &ElementVector<'_, R, K>) -> [[R; 4]; 4] {
+    let ElementVector { tile, first, p1, s, .. } = *elements;
+    // The pass before has put it there.
+    let known = elements.h;
+    let stress = if K::REMEMBERS { known } else { Deformation::with(elements.h, elements.invariants).stress(p1, s) };
     let minus_volume = -tile.volume::<R>(first);
     let mut forces = [[R::splat(0.0); 3]; 4];
     for axis in 0..3 {
@@ -359,30 +408,33 @@ fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
 }
 
 /// The third pass: adds the forces of some strips to their nodes.
-struct AddForces<'a, 'b, R> {
-    batch: &'a [ElementVector<'b, R>],
+struct AddForces<'a, 'b, R: Real, P: Past> {
+    batch: &'a [ElementVector<'b, R, P>],
     /// Elements of a strip.
     length: usize,
     force: Scatter<'a>,
 }
 
-impl<R: Real> Piece for AddForces<'_, '_, R> {
+impl<R: Real, P: Past> Piece for AddForces<'_, '_, R, P> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let Self { batch, length, force } = self;
         match length {
-            3 => scatter::<R, 3, 6>(batch, force),
-            2 => scatter::<R, 2, 5>(batch, force),
-            _ => scatter::<R, 1, 4>(batch, force),
+            3 => scatter::<R, P, 3, 6>(batch, force),
+            2 => scatter::<R, P, 2, 5>(batch, force),
+            _ => scatter::<R, P, 1, 4>(batch, force),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R>], mut force: Scatter<'_>) {
+fn scatter<R: Real, P: Past, const K: usize, const N: usize>(
+    batch: &[ElementVector<'_, R, P>],
+    mut force: Scatter<'_>,
+) {
     let mut buffer = ScatterBuffer::NONE;
     for strip in batch.as_chunks::<K>().0 {
         let mut rows = [[R::splat(0.0); 4]; N];

@@ -7,8 +7,8 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::internal_forces::ElementVisitor;
 use super::{
-    CriticalBounds, ElementTangents, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces,
-    PatchTangents, ScalarBound, TileTangents,
+    CriticalBounds, ElementTangents, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure, PatchBounds,
+    PatchForces, PatchTangents, Relaxing, ScalarBound, TileTangents,
 };
 
 /// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,
@@ -90,8 +90,45 @@ pub(crate) fn tangents<L: ElementLaw>(
     }
 }
 
+/// A visitor with which the internal forces of tissue that relaxes are compiled: once, for a law known at run time.
+pub(crate) trait RelaxingVisitor: ElementVisitor + Copy + Sync {
+    fn relaxing_forces(kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Relaxing<'_>>) -> Extremes<f32>;
+    fn relaxing_nodal_pressure_forces(
+        kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Relaxing<'_>>,
+    ) -> Extremes<f32>;
+    fn relaxing_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Relaxing<'_>>) -> Extremes<f32>;
+}
+
+macro_rules! implement_relaxing {
+    ($($visitor:ty),*) => {
+        $(
+            impl RelaxingVisitor for $visitor {
+                #[inline(never)]
+                fn relaxing_forces(
+                    kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Relaxing<'_>>,
+                ) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+
+                #[inline(never)]
+                fn relaxing_nodal_pressure_forces(
+                    kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Relaxing<'_>>,
+                ) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+
+                #[inline(never)]
+                fn relaxing_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Relaxing<'_>>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+            }
+        )*
+    };
+}
+implement_relaxing!(NoVisitor, ScalarBound);
+
 /// A visitor with which the internal forces of every law are compiled.
-pub(crate) trait ForcesVisitor<L: ElementLaw>: ElementVisitor + Copy + Sync {
+pub(crate) trait ForcesVisitor<L: ElementLaw>: RelaxingVisitor {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
     fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32>;

@@ -25,6 +25,7 @@ mod patch_deformation;
 mod patch_forces;
 mod patch_tangents;
 mod pressure;
+mod relaxation;
 mod stiffness_bound;
 #[cfg(test)]
 mod stiffness_bound_tests;
@@ -61,6 +62,7 @@ pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, 
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
+pub(crate) use relaxation::{Elastic, Relaxing, Series, VECTORS_OF_TERM};
 pub(crate) use stiffness_bound::ScalarBound;
 pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
 

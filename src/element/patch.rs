@@ -196,6 +196,15 @@ impl<'a> Patches<'a> {
         groups.flat_map(move |group| self.tiles.get(start(group)..start(group + 1)).unwrap_or_default())
     }
 
+    /// Tiles of the patches whose node's partition is one of these.
+    pub(crate) fn tiles_of(&self, partitions: &Range<usize>) -> Range<usize> {
+        let start = |partition: usize| {
+            let end = (2 * partition).checked_sub(1).and_then(|last| self.layout.ends.get(last));
+            end.map_or(0, |&end| end as usize)
+        };
+        start(partitions.start)..start(partitions.end)
+    }
+
     /// The table of patches.
     pub(crate) const fn tiles(&self) -> &'a [PatchTile] {
         self.tiles

@@ -13,13 +13,14 @@
 use core::marker::PhantomData;
 use core::ops::Range;
 
-use crate::material::{Law, LawState, Laws, Potential};
+use crate::material::{AnyLaw, Law, LawState, Laws, Potential};
 use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
 use super::patch_deformation::{GradientLengths, gradient};
+use super::relaxation::{Elastic, Past};
 use super::stiffness_bound::{Coefficients, scalar_bound_of_patches};
 use super::tile::vector_at;
 
@@ -28,7 +29,7 @@ use super::tile::vector_at;
 pub(crate) const STABILISATION: f32 = 0.4;
 
 /// The kernel that adds internal forces to the nodes of some partitions, and what the visitor asks for.
-pub struct PatchForces<'a, L, V> {
+pub struct PatchForces<'a, L, V, K = Elastic> {
     pub(crate) laws: Laws<'a, L>,
     pub(crate) patches: Patches<'a>,
     pub(crate) partitions: Range<usize>,
@@ -37,9 +38,18 @@ pub struct PatchForces<'a, L, V> {
     pub(crate) remainder: &'a [NodeVector],
     pub(crate) force: Scatter<'a>,
     pub(crate) visitor: PhantomData<V>,
+    pub(crate) past: K,
 }
 
-impl<L: Law, V: ElementVisitor> Kernel for PatchForces<'_, L, V> {
+impl<'a, L: Law + Into<AnyLaw>, V> PatchForces<'a, L, V> {
+    /// The same for tissue that knows more of the past.
+    pub(crate) fn with_past<K>(self, past: K) -> PatchForces<'a, AnyLaw, V, K> {
+        let Self { laws, patches, partitions, displacement, remainder, force, visitor, past: Elastic } = self;
+        PatchForces { laws: laws.any(), patches, partitions, displacement, remainder, force, visitor, past }
+    }
+}
+
+impl<L: Law, V: ElementVisitor, K: Past> Kernel for PatchForces<'_, L, V, K> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
@@ -48,24 +58,26 @@ impl<L: Law, V: ElementVisitor> Kernel for PatchForces<'_, L, V> {
     fn run<R: Real>(self) -> Extremes<f32> {
         // Vectors in a tile.
         match R::COUNT {
-            16 => add_all::<R, L, V, 1>(self),
-            8 => add_all::<R, L, V, 2>(self),
-            4 => add_all::<R, L, V, 4>(self),
-            _ => add_all::<R, L, V, TILE>(self),
+            16 => add_all::<R, L, V, K, 1>(self),
+            8 => add_all::<R, L, V, K, 2>(self),
+            4 => add_all::<R, L, V, K, 4>(self),
+            _ => add_all::<R, L, V, K, TILE>(self),
         }
     }
 }
 
 #[inline(always)]
-fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(kernel: PatchForces<'_, L, V>) -> Extremes<f32> {
-    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, .. } = kernel;
+fn add_all<R: Real, L: Law, V: ElementVisitor, K: Past, const PARTS: usize>(
+    kernel: PatchForces<'_, L, V, K>,
+) -> Extremes<f32> {
+    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, mut past, .. } = kernel;
     let moved = [displacement, remainder].map(Gather::new);
     let mut extremes = Extremes::<R>::none();
     for tile in patches.touching(partitions) {
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress = stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, moved, &mut extremes);
+            *stress = stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut past, &mut extremes);
         }
         scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
     }
@@ -100,12 +112,13 @@ impl<R: Real> Stress<R> {
 }
 
 #[inline(always)]
-fn stress_of<R: Real, L: Law, V: ElementVisitor>(
+fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Past>(
     laws: &Laws<'_, L>,
     tile: &PatchTile,
     neighbours: &[Neighbours],
     first: usize,
     moved: [Gather<'_>; 2],
+    past: &mut K,
     extremes: &mut Extremes<R>,
 ) -> Stress<R> {
     let (h, pull) = gradient::<R>(tile, neighbours, first, moved);
@@ -116,7 +129,8 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     extremes.least_change = deformation.invariants.j.min(extremes.least_change);
     extremes.saturation = response.saturation.max(extremes.saturation);
     let modulus = modulus_of::<R, L>(&law);
-    let mut p = deformation.stress(response.p1, response.s);
+    let (place, element) = ((tile, first), |lane| tile.element(first + lane));
+    let mut p = past.stress(place, element, &deformation, [response.p1, response.s], &K::of_law(&local));
     for i in 0..3 {
         for j in 0..3 {
             p[i][j] = p[i][j] - modulus * h[i][j];

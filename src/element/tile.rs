@@ -166,10 +166,23 @@ impl ElementTile {
 /// The vector of values from place `first` of a row of a tile on.
 #[inline(always)]
 pub(super) fn vector_at<R: Real>(row: &[f32; TILE], first: usize) -> R {
-    // `first` is a multiple of the width already. This shows the compiler that no index is out of range.
-    let vectors = (TILE / R::COUNT).max(1);
-    let first = first / R::COUNT % vectors * R::COUNT;
+    let first = multiple_of_width::<R>(first);
     R::from_fn(|lane| row[(first + lane) % TILE])
+}
+
+/// Writes a vector to a row of a tile, from place `first` on.
+#[inline(always)]
+pub(super) fn write_at<R: Real>(row: &mut [f32; TILE], first: usize, vector: R) {
+    let first = multiple_of_width::<R>(first);
+    for lane in 0..R::COUNT {
+        row[(first + lane) % TILE] = vector.lane(lane);
+    }
+}
+
+/// `first`, which is one already: this shows the compiler that no index is out of range.
+#[inline(always)]
+fn multiple_of_width<R: Real>(first: usize) -> usize {
+    first / R::COUNT % (TILE / R::COUNT).max(1) * R::COUNT
 }
 
 /// An upper bound, despite rounding, of the largest eigenvalue of `sum_a ga ga^T` over the four gradients, 1/m^2.

@@ -64,10 +64,11 @@ pub(crate) fn second_run() -> Method<'static> {
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
-    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&second_run(), scene, points)?)
+    let of_state = vectors_of_state(scene.element(), scene.node_count()) + scene.memory_vectors();
+    Ok(of_state + vectors_for_method(&second_run(), scene, points)?)
 }
 
-/// No fewer than a guard needs on any scene of so many nodes and elements.
+/// No fewer than a guard needs on any scene of so many nodes and elements whose tissue does not relax.
 #[must_use]
 pub fn vectors_at_most(element: Element, nodes: usize, elements: usize) -> usize {
     vectors_of_state(element, nodes).saturating_add(inertia::vectors_at_most(
@@ -157,7 +158,7 @@ impl Watch {
         let mut progress = Progress::START;
         let (needed, capacity) = (vectors_for(scene, points)?, storage.len());
         let Some((mut copied, of_second)) =
-            split(scene.element(), storage, nodes, &mut progress).filter(|_| capacity >= needed)
+            split(scene, storage, nodes, &mut progress).filter(|_| capacity >= needed)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
@@ -257,7 +258,7 @@ impl GuardView<'_> {
     ) {
         let Self { second: large, watch, storage } = self;
         let seconds = step.seconds();
-        match (split(scene.element(), storage, watch.nodes, &mut watch.progress), loads) {
+        match (split(scene, storage, watch.nodes, &mut watch.progress), loads) {
             (Some((second, of_second)), Some(loads)) => {
                 let _ = large.with_storage(of_second).shorten(seconds, scene, loads, second, threads);
             }
@@ -284,7 +285,7 @@ impl GuardView<'_> {
             return taken;
         }
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes };
-        let Some((mut second, of_second)) = split(scene.element(), storage, nodes, progress) else {
+        let Some((mut second, of_second)) = split(scene, storage, nodes, progress) else {
             return mismatch;
         };
         if scene.node_count() != nodes || state.capacity_for(scene.element()) < nodes {
@@ -375,8 +376,8 @@ impl Pushes {
 }
 
 /// The second run's state and the rest of the storage.
-fn split<'a>(
-    element: Element,
+fn split<'a, M: Material>(
+    scene: SceneView<'_, M>,
     storage: &'a mut [NodeVector],
     nodes: usize,
     progress: &'a mut Progress,
@@ -385,9 +386,11 @@ fn split<'a>(
     let (remainder, rest) = rest.split_at_mut_checked(nodes)?;
     let (increment, rest) = rest.split_at_mut_checked(nodes)?;
     let (force, rest) = rest.split_at_mut_checked(nodes)?;
-    let volumes = vectors_of_state(element, nodes) - 4 * nodes;
+    let volumes = vectors_of_state(scene.element(), nodes) - 4 * nodes;
     let (volume, rest) = rest.split_at_mut_checked(volumes)?;
-    Some((StateView::new(displacement, remainder, increment, force, volume, progress), rest))
+    let (memory, rest) = rest.split_at_mut_checked(scene.memory_vectors())?;
+    let state = StateView::new(displacement, remainder, increment, force, volume, progress);
+    Some((state.remembering(memory), rest))
 }
 
 /// Makes the second run start from the state of the first.
@@ -395,6 +398,7 @@ fn start_from(state: &StateView<'_>, second: &mut StateView<'_>) {
     copy(second.displacement, state.displacement);
     copy(second.remainder, state.remainder);
     copy(second.increment, state.increment);
+    copy(second.memory, state.memory);
     set(second.progress, state.progress);
 }
 

@@ -115,8 +115,8 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
-        let TotalForces { forcing, volume, force, .. } = trial.forcing(ScalarBound, LOOK_CYCLE_OF_LONG);
-        let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
+        let TotalForces { forcing, volume, force, after, .. } = trial.forcing(ScalarBound, LOOK_CYCLE_OF_LONG);
+        let (_, extremes) = forcing.in_parts(volume, force, &mut [], after, self.threads, |_, _, _: &mut [()]| ());
         let frames = &mut self.storage.matrices.frames;
         self.model.renewal.update_frames(frames, trial.displacement, trial.progress.steps);
         trial.add_pushes_before(self.step);

@@ -22,9 +22,11 @@ pub(super) struct Learned<'a, 'w, T> {
 }
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
+    const RELAXES: bool = false;
+
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let (network, step, inertia) = (self.network, self.step, trial.scene.inertia);
-        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, 1);
+        let TotalForces { forcing, increment, volume, force, after } = trial.forcing(NoVisitor, 1);
         let displacement = forcing.displacement;
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
@@ -32,7 +34,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
             let increment = increment.get(nodes).unwrap_or_default();
             Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
         };
-        let (results, extremes) = forcing.in_parts(volume, force, self.vertices, self.threads, predict);
+        let (results, extremes) = forcing.in_parts(volume, force, self.vertices, after, self.threads, predict);
         *self.report = Counts::of_all(results.iter().map(|(_, counts)| counts)).report();
         Computed { totals: Totals::of_all(results.iter().map(|(totals, _)| totals)), extremes }
     }

@@ -504,7 +504,7 @@ impl<'w> LearnedView<'_, 'w> {
         let before = *state.progress;
         let (_, saved) = self.storage.split_at_mut(self.storage.len().min(VERTEX_VECTORS * nodes));
         if self.model.undoes {
-            state.save(saved);
+            state.save(nodes, saved);
         }
         self.take_over(state)?;
         let Self { model, storage } = self;
@@ -523,7 +523,7 @@ impl<'w> LearnedView<'_, 'w> {
         if model.undoes && (status.is_unexplained() || wild.is_some()) {
             model.turns.undo(before.time, wild.unwrap_or(status));
             *state.progress = before;
-            state.restore(saved);
+            state.restore(nodes, saved);
             if state.dt != exact {
                 state.respan(exact);
             }

@@ -44,12 +44,14 @@ pub(crate) use for_each_law;
 for_each_law! { @ modules [] }
 mod any;
 mod moduli;
+mod prony;
 mod response;
 mod tissue;
 
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
 pub use moduli::Moduli;
+pub use prony::{MOST_TERMS, Prony, PronyError};
 #[cfg(feature = "std")]
 pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};

@@ -110,6 +110,12 @@ impl<R: Real> LawState<R> {
         [self.factor.g, self.factor.slope, self.factor.curvature()]
     }
 
+    /// `J - 1`, no less than at [`J_FLOOR`], and `1 / J` there.
+    #[inline(always)]
+    pub(crate) fn clamped_volume(&self) -> [R; 2] {
+        [self.factor.clamped, self.factor.inverse]
+    }
+
     /// The stress scalars.
     #[inline(always)]
     pub(crate) fn response(&self) -> Response<R> {

@@ -1,6 +1,6 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
-use super::{AnyLaw, Law, Values};
+use super::{AnyLaw, Law, Prony, Values};
 use crate::simd::{Real, TILE};
 
 /// A law with a density.
@@ -98,6 +98,12 @@ pub trait Material: Sync {
     fn region(&self, _element: usize) -> u16 {
         0
     }
+
+    /// How the tissues relax, by index; those that are not listed do not.
+    #[inline(always)]
+    fn prony(&self) -> &[Prony] {
+        &[]
+    }
 }
 
 /// The same material in tetrahedra with average nodal pressure (Bonet & Burton 1998; for TLED with several tissues
@@ -107,6 +113,11 @@ pub struct NodalPressure<M>(pub M);
 
 impl<M: Material> Material for NodalPressure<M> {
     type Law = M::Law;
+
+    #[inline(always)]
+    fn prony(&self) -> &[Prony] {
+        self.0.prony()
+    }
 
     #[inline(always)]
     fn element(&self) -> Element {
@@ -142,6 +153,11 @@ pub struct NodalStrain<M>(pub M);
 
 impl<M: Material> Material for NodalStrain<M> {
     type Law = M::Law;
+
+    #[inline(always)]
+    fn prony(&self) -> &[Prony] {
+        self.0.prony()
+    }
 
     #[inline(always)]
     fn element(&self) -> Element {
@@ -202,6 +218,17 @@ impl<'a, L: Law> Laws<'a, L> {
         match *self {
             Self::One(_) => 0,
             Self::Regions { of_element, .. } => of_element.get(element).copied().unwrap_or_default(),
+        }
+    }
+
+    /// The same, for kernels that are compiled for no law of their own.
+    pub(crate) fn any(self) -> Laws<'a, AnyLaw>
+    where
+        L: Into<AnyLaw>,
+    {
+        match self {
+            Self::One(law) => Laws::One(law.into()),
+            Self::Regions { law, tissues, of_element } => Laws::Regions { law: law.into(), tissues, of_element },
         }
     }
 
@@ -298,6 +325,8 @@ pub struct AnyMaterial<'a, L = AnyLaw> {
     pub tissues: &'a [TissueValues],
     /// For each element of the mesh the index of its tissue; not read where there is only one.
     pub of_element: &'a [u16],
+    /// How the tissues relax, by index; those that are not listed do not.
+    pub prony: &'a [Prony],
 }
 
 impl<'a, L: Law> AnyMaterial<'a, L> {
@@ -337,6 +366,11 @@ impl<L: Law> Material for AnyMaterial<'_, L> {
     fn region(&self, element: usize) -> u16 {
         if self.tissues.len() == 1 { 0 } else { self.regions().region(element) }
     }
+
+    #[inline]
+    fn prony(&self) -> &[Prony] {
+        self.prony
+    }
 }
 
 /// [`AnyMaterial`] that owns its tissues.
@@ -351,6 +385,8 @@ pub struct VecMaterial {
     pub tissues: std::vec::Vec<TissueValues>,
     /// See [`AnyMaterial::of_element`].
     pub of_element: std::vec::Vec<u16>,
+    /// See [`AnyMaterial::prony`].
+    pub prony: std::vec::Vec<Prony>,
 }
 
 #[cfg(feature = "std")]
@@ -359,12 +395,12 @@ impl VecMaterial {
     pub fn one(element: Element, law: impl Into<AnyLaw>, density: f32) -> Self {
         let law = law.into();
         let tissues = std::vec![Tissue { law, density }.values()];
-        Self { element, law, tissues, of_element: std::vec::Vec::new() }
+        Self { element, law, tissues, of_element: std::vec::Vec::new(), prony: std::vec::Vec::new() }
     }
 
     fn view(&self) -> AnyMaterial<'_> {
-        let Self { element, law, tissues, of_element } = self;
-        AnyMaterial { element: *element, law: *law, tissues, of_element }
+        let Self { element, law, tissues, of_element, prony } = self;
+        AnyMaterial { element: *element, law: *law, tissues, of_element, prony }
     }
 }
 
@@ -387,5 +423,10 @@ impl Material for VecMaterial {
 
     fn region(&self, element: usize) -> u16 {
         self.view().region(element)
+    }
+
+    #[inline]
+    fn prony(&self) -> &[Prony] {
+        &self.prony
     }
 }

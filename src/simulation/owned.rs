@@ -122,7 +122,7 @@ impl<'w> Simulation<'w> {
             pulled: vec![],
             points,
             tets,
-            state: VecState::at_rest(scene.node_count()),
+            state: VecState::of(scene.view()),
             scene,
             settings: Settings::default(),
             touchable: (vec![], vec![]),
@@ -296,7 +296,7 @@ impl<'w> Simulation<'w> {
             _ => {
                 // Refused here, not in the middle of a call.
                 let pace = Pace::of(step, damping, critical)?;
-                let kept = vec![NodeVector::ZERO; vectors_for_pace(nodes)];
+                let kept = vec![NodeVector::ZERO; vectors_for_pace(nodes, scene.view().memory_vectors())];
                 Ok::<_, SimulationError>(Exact::Paced { pace, kept, damping })
             }
         };

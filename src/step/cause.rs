@@ -55,6 +55,9 @@ pub enum Cause {
     /// The loads have pulls, which learned steps do not know, exact ones only with room for their forces
     /// ([`StateView::pulling`](crate::state::StateView::pulling)).
     NoPulls,
+    /// The tissue relaxes, which learned steps do not know, others only with room for what it remembers
+    /// ([`StateView::remembering`](crate::state::StateView::remembering)).
+    NoMemory,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
         /// How far, m.
@@ -109,6 +112,13 @@ impl fmt::Display for Divergence {
                 write!(
                     f,
                     "stopped at {time:.6} s: the loads have pulls, which this step does not know, or has no room for their forces"
+                )
+            }
+            Cause::NoMemory => {
+                write!(
+                    f,
+                    "stopped at {time:.6} s: the tissue relaxes (prony), which this step does not know, or has no room for \
+                     what it remembers"
                 )
             }
             Cause::Motion { metre, size } => write!(

@@ -67,6 +67,10 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) touched: usize,
     /// Forces of the pulls, N.
     pub(crate) pulls: &'a mut [NodeVector],
+    /// What tissue remembers, see [`StateView`], and the halves of the last step and of this one through which it
+    /// relaxes, s.
+    pub(crate) memory: &'a mut [NodeVector],
+    pub(crate) halves: [f32; 2],
     /// The node and the instrument that the step must not be taken with.
     pub(crate) refused: Option<(u32, Cause)>,
 }
@@ -126,6 +130,12 @@ pub(crate) trait StepMethod<M> {
         true
     }
 
+    /// Whether tissue relaxes in this step as it does with time.
+    const RELAXES: bool = true;
+
+    /// Whether it has had all the time to relax.
+    const IS_RELAXED: bool = false;
+
     /// Takes back what the method has noted for itself: the step is refused.
     fn refuse(&mut self) {}
 
@@ -148,8 +158,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, remainder, increment, force, volume, progress, touches, points, pushes, pulls } =
-            state;
+        let StateView { displacement, remainder, increment, force, volume, progress, .. } = state;
+        let StateView { touches, points, pushes, pulls, memory, .. } = state;
         Ok(Self {
             scene,
             loads,
@@ -166,6 +176,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             pushes,
             touched: 0,
             pulls,
+            memory,
+            halves: [0.0; 2],
             refused: None,
         })
     }
@@ -188,7 +200,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// Takes the step, or refuses it.
-    pub(crate) fn take(mut self, step: &Step, method: &mut impl StepMethod<M>) -> Status {
+    pub(crate) fn take<C: StepMethod<M>>(mut self, step: &Step, method: &mut C) -> Status {
         if self.loads.contact().is_some() && !method.meets_instruments(&self) {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
@@ -196,6 +208,14 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         if self.loads.pulls().is_some() && !method.follows_pulls(&self) {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoPulls });
+        }
+        let remembered = self.scene.memory_vectors();
+        if remembered > 0 {
+            if !C::RELAXES || self.memory.len() < remembered {
+                let time = self.progress.time;
+                return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoMemory });
+            }
+            self.halves = if C::IS_RELAXED { [f32::INFINITY, 0.0] } else { [self.progress.half, 0.5 * step.seconds()] };
         }
         let before = self.progress.energy_balance;
         let heat = match self.progress.steps % heat::EVERY {
@@ -223,6 +243,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.extremes = extremes;
         method.advance(&mut self);
         self.progress.dt = step.seconds();
+        (self.progress.half, self.progress.second) = (self.halves[1], !self.progress.second);
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;
         if self.scene.element().is_nodal_strain() {

@@ -6,15 +6,16 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extremes, ForcesVisitor, InternalForces,
-    LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked,
-    is_marked_at, mask_of, masks, masks_mut,
+    AddCrushed, CrushedElements, CrushedForces, Elastic, ElementMaterial, ElementTile, Elements, Extremes,
+    ForcesVisitor, InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure,
+    PatchForces, Relaxing, Series, each_marked, is_marked_at, mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
+use crate::material::Material;
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::scene::SceneView;
 use crate::simd::{NodeVector, Scatter};
-use crate::state::Progress;
+use crate::state::{Progress, copies_of};
 
 use super::Trial;
 use super::threads::{Threads, take};
@@ -31,17 +32,34 @@ pub(crate) struct Forcing<'a, M, V> {
     pub(crate) loads: &'a Loads<'a>,
     /// Of the state, for the time of the loads.
     pub(crate) progress: &'a Progress,
+    /// How tissue relaxes, if it does, and what it remembers.
+    pub(crate) series: Option<Series<'a>>,
+    pub(crate) before: &'a [NodeVector],
     /// Steps of this kind in which every element is looked at where some may be crushed ([`crate::element`]).
     pub(crate) look_cycle: usize,
 }
 
-impl<M> Trial<'_, M> {
+impl<M: Material> Trial<'_, M> {
     /// The input of the total forces, the latest increments, and where to write volumes and forces.
     pub(crate) fn forcing<V>(&mut self, visitor: V, look_cycle: usize) -> TotalForces<'_, M, V> {
         let Self { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = self;
         let (scene, is_heated) = (*scene, *is_heated);
-        let forcing = Forcing { scene, visitor, displacement, remainder, is_heated, loads, progress, look_cycle };
-        TotalForces { forcing, increment, volume, force }
+        let series = scene.series(self.halves, progress.steps);
+        let remembered = self.memory.get_mut(..scene.memory_vectors()).unwrap_or_default();
+        let [before, after] = copies_of(remembered, progress);
+        let forcing = Forcing {
+            scene,
+            visitor,
+            displacement,
+            remainder,
+            is_heated,
+            loads,
+            progress,
+            series,
+            before,
+            look_cycle,
+        };
+        TotalForces { forcing, increment, volume, force, after }
     }
 }
 
@@ -51,6 +69,8 @@ pub(crate) struct TotalForces<'a, M, V> {
     pub(crate) increment: &'a [NodeVector],
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
+    /// What tissue remembers after the step.
+    pub(crate) after: &'a mut [NodeVector],
 }
 
 /// The partitions of one thread, with their share of the arrays.
@@ -59,6 +79,9 @@ struct Part<'a, T, F> {
     force: &'a mut [NodeVector],
     extra: &'a mut [T],
     results: &'a mut [F],
+    /// What the tissue of its tiles remembers after the step, and the first of these.
+    after: &'a mut [NodeVector],
+    own: usize,
     extremes: Extremes<f32>,
 }
 
@@ -104,6 +127,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         volumes: &mut [NodeVector],
         mut force: &mut [NodeVector],
         mut extra: &mut [T],
+        mut after: &mut [NodeVector],
         threads: &impl Threads,
         then: impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F + Sync,
     ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
@@ -120,7 +144,9 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
             let nodes = partitions.nodes(&mine).len();
             let (force, extra) = (take(&mut force, nodes), take(&mut extra, nodes));
             let results = take(&mut rest, mine.len());
-            Part { partitions: mine, force, extra, results, extremes: Extremes::none() }
+            let tiles = self.scene.relaxing_tiles_of(&mine);
+            let (own, after) = (tiles.start, take(&mut after, tiles.len() * self.scene.vectors_of_tile()));
+            Part { partitions: mine, force, extra, results, after, own, extremes: Extremes::none() }
         });
         let parts = parts.get_mut(..count).unwrap_or_default();
         threads.each(parts, |part| self.compute(part, volumes, &then));
@@ -153,7 +179,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         volumes: &[NodeVector],
         then: &impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F,
     ) {
-        let Part { partitions, force, extra, results, extremes } = part;
+        let Part { partitions, force, extra, results, after, own, extremes } = part;
         let elements = self.scene.elements();
         let all = elements.partitions;
         let nodes = all.nodes(partitions);
@@ -162,7 +188,8 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         if let Some(pressure) = self.loads.pressure() {
             pressure.add_forces(self.progress.time, self.displacement, nodes.start, force);
         }
-        *extremes = internal_forces(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor);
+        let past = self.series.map(|series| (series, self.before, &mut **after, *own));
+        *extremes = forces_with_past(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor, past);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -243,8 +270,11 @@ fn crushed_forces<M: ElementMaterial>(
     sum.least_change
 }
 
+/// What relaxes, what it remembers, and where that is written after the step, from a tile on.
+type PastOfPart<'a> = (Series<'a>, &'a [NodeVector], &'a mut [NodeVector], usize);
+
 /// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the
-/// [`nodal_volumes`] where the material needs them, or the marks of crushed elements.
+/// [`nodal_volumes`] where the material needs them, or the marks of crushed elements: of tissue that has not relaxed.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
@@ -253,12 +283,26 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     force: &mut [NodeVector],
     visitor: V,
 ) -> Extremes<f32> {
+    forces_with_past(scene, partitions, moved, volumes, force, visitor, None)
+}
+
+fn forces_with_past<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
+    scene: SceneView<'_, M>,
+    partitions: Range<usize>,
+    moved: [&[NodeVector]; 2],
+    volumes: &[NodeVector],
+    force: &mut [NodeVector],
+    visitor: V,
+    past: Option<PastOfPart<'_>>,
+) -> Extremes<f32> {
     let elements = scene.elements();
+    let relaxing_elements =
+        |(series, before, after, own)| Relaxing::new::<ElementTile>(series, scene.tiles, before, after, own);
     if scene.element().is_nodal_strain() {
         let (laws, patches, visitor) = (elements.laws, scene.patches, PhantomData);
         let ([displacement, remainder], of) = (moved, partitions.clone());
         let scatter = Scatter::from(elements.partitions.nodes(&of).start, &mut *force);
-        let mut extremes = V::patch_forces(PatchForces {
+        let kernel = PatchForces {
             laws,
             patches,
             partitions: of,
@@ -266,17 +310,31 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
             remainder,
             force: scatter,
             visitor,
-        });
+            past: Elastic,
+        };
+        let mut extremes = match past {
+            None => V::patch_forces(kernel),
+            Some((series, before, after, own)) => {
+                let past = Relaxing::new(series, patches.tiles(), before, after, own);
+                V::relaxing_patch_forces(kernel.with_past(past))
+            }
+        };
         let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS_PATCHES);
         extremes.least_change = extremes.least_change.min(least);
         extremes
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
-        V::nodal_pressure_forces(kernel)
+        match past {
+            None => V::nodal_pressure_forces(kernel),
+            Some(past) => V::relaxing_nodal_pressure_forces(kernel.with_past(relaxing_elements(past))),
+        }
     } else {
         let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
-        V::forces(kernel)
+        match past {
+            None => V::forces(kernel),
+            Some(past) => V::relaxing_forces(kernel.with_past(relaxing_elements(past))),
+        }
     }
 }
 

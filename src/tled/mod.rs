@@ -82,7 +82,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let (inertia, step, loads) = (trial.scene.inertia, self.step, trial.loads);
         let (instruments, is_pulled) = (loads.contact().is_some(), loads.pulls().is_some());
-        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, LOOK_CYCLE);
+        let TotalForces { forcing, increment, volume, force, after } = trial.forcing(NoVisitor, LOOK_CYCLE);
         let total = |nodes: Range<usize>, increment: &[NodeVector], force: &[NodeVector]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
@@ -92,7 +92,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
             // The forces of pulls are not among these yet.
             if is_pulled { Totals::NONE } else { total(nodes, increment, force) }
         };
-        let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
+        let (totals, extremes) = forcing.in_parts(volume, force, &mut [], after, self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
         if is_pulled {
             let work = trial.pull(step, self, MOST_WAY);

@@ -70,11 +70,12 @@ pub enum Approach {
     Refused(Status),
 }
 
-/// Vectors of storage for a state of so many nodes, to undo steps, to look at the critical step, and to keep the forces
-/// of the latest step meanwhile.
+/// Vectors of storage for a state of so many nodes whose tissue remembers `memory` vectors
+/// ([`SceneView::memory_vectors`]), to undo steps, to look at the critical step, and to keep the forces of the latest
+/// step meanwhile.
 #[must_use]
-pub const fn vectors_for_pace(nodes: usize) -> usize {
-    (MOVED_VECTORS + 1) * nodes + nodes.div_ceil(4)
+pub const fn vectors_for_pace(nodes: usize, memory: usize) -> usize {
+    (MOVED_VECTORS + 1) * nodes + nodes.div_ceil(4) + memory / 2
 }
 
 impl Pace {
@@ -147,9 +148,10 @@ impl Pace {
             self.look_soon();
         }
         let nodes = scene.node_count();
-        let (before, kept) = kept.split_at_mut((MOVED_VECTORS * nodes).min(kept.len()));
+        let saved = MOVED_VECTORS * nodes + scene.memory_vectors() / 2;
+        let (before, kept) = kept.split_at_mut(saved.min(kept.len()));
         let (force, weights) = kept.split_at_mut(nodes.min(kept.len()));
-        state.save(before);
+        state.save(nodes, before);
         let progress = *state.progress;
         let count = whole.min(self.steps.saturating_sub(self.taken)).min(work.left().max(1));
         let (mut refused, mut taken, mut extremes, mut squeezed) = (None, 0, Extremes::none(), false);
@@ -179,8 +181,8 @@ impl Pace {
         let jumps = refused.is_some_and(Status::is_too_far);
         let outrun = (refused.is_some() && !jumps) || seconds > now;
         if outrun && seconds > self.shortest {
-            state.restore(before);
             *state.progress = progress;
+            state.restore(nodes, before);
             self.longest = 0.5 * seconds;
             self.look_soon();
             self.moment = Some(state.moment());

@@ -101,13 +101,14 @@ impl<T> Relaxation<'_, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
+    const IS_RELAXED: bool = true;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let inertia = trial.scene.inertia;
-        let TotalForces { forcing, increment, volume, force } = trial.forcing(NoVisitor, LOOK_CYCLE);
+        let TotalForces { forcing, increment, volume, force, after } = trial.forcing(NoVisitor, LOOK_CYCLE);
         let own = Relaxation { step: self.step, node: self.node, rates: self.rates, threads: &(), is_fine: false };
         let sums_of = |nodes, force: &[NodeVector], _: &mut [()]| own.sums(nodes, inertia, increment, force);
-        let (sums, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, sums_of);
+        let (sums, extremes) = forcing.in_parts(volume, force, &mut [], after, self.threads, sums_of);
         let mut totals = Totals::of_all(&sums);
         totals.add_work(trial.pull(self.step, self, MOST_WAY));
         if trial.loads.pulls().is_some() {

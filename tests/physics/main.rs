@@ -20,5 +20,6 @@ mod nodal_pressure;
 mod nodal_strain;
 mod patch;
 mod reference_self;
+mod relaxation;
 mod stability;
 mod vibration;

@@ -89,7 +89,7 @@ impl Tissues {
     pub(crate) fn material(&self, element: Element) -> VecMaterial {
         let law = self.tissues[0].law;
         let tissues = self.tissues.iter().map(Tissue::values).collect();
-        VecMaterial { element, law, tissues, of_element: self.of_element.clone() }
+        VecMaterial { element, law, tissues, of_element: self.of_element.clone(), prony: vec![] }
     }
 }
 

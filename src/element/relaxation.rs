@@ -1,0 +1,328 @@
+//! Stress that depends on the past: a Prony series ([`Prony`]) on the isochoric part of any law, at finite strain
+//! (Simo & Hughes 1998, "Computational Inelasticity", section 10.3). With `A = DEV[2 W' I]`, the stress of distortion
+//! of the law in the reference frame, each term keeps
+//!
+//! ```text
+//! Q_i' + Q_i / tau_i = g_i / tau_i A,    P = P(law) - J^(-2/3) F DEV[sum_i Q_i],   DEV[X] = X - (X:C) C^-1 / 3
+//! ```
+//! **In time.** The step keeps `Q` at the middle of the last step and takes `A` as that of `t_n` from there to the
+//! middle of the next one: exact for constant `A`, second order in the step, and no older stress is needed,
+//!
+//! ```text
+//! Q_n = q + (1 - e^(-h / tau)) (g A_n - q),   q <- q + (1 - e^(-(h + h') / tau)) (g A_n - q)
+//! ```
+//! with the halves `h` and `h'` of the last step and of this one. An infinite `h` is a body that has had time to relax.
+//!
+//! **Stability.** For linear motion the stress of a term at `z = e^(i w)` is `k (1 - g (1 - b) - g b (1 - b^2) / (z -
+//! b^2))` with `b = e^(-h / tau)`. Its imaginary part is not negative for `0 < w < pi`: a term only takes energy, and a
+//! root can leave the unit circle at `z = -1` alone, where the factor is `1 - g (1 - b)^2 / (1 + b^2) <= 1`. So the
+//! critical step is no shorter than that of the law.
+//!
+//! **Rounding.** Steps may be a hundred thousand times shorter than `tau`, and a sum swallows what is less than half a
+//! unit in its last place. So a part of about a unit is added, another in each step, by which sums are rounded up as often
+//! as is right in the mean.
+//!
+//! **Memory.** Two copies of six numbers for each term and element, or patch with nodal strain: steps read the one and
+//! write the other. So a step that is refused leaves no trace, and elements that two threads compute are written by one.
+
+use bytemuck::must_cast_slice;
+
+use crate::material::{LawState, MOST_TERMS, Prony};
+use crate::simd::{NodeVector, Real, TILE, dot};
+
+use super::deformation::{Deformation, Matrix};
+use super::tile::{vector_at, write_at};
+
+/// Components of a symmetric matrix: xx, yy, zz, xy, yz, zx.
+const COMPONENTS: usize = 6;
+const PAIRS: [[usize; 2]; COMPONENTS] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
+
+/// Vectors of one copy of the memory of a term of a tile.
+pub(crate) const VECTORS_OF_TERM: usize = COMPONENTS * TILE / 4;
+
+/// What the stress of elements knows of the past.
+pub(crate) trait Past {
+    /// Whether that is more than nothing.
+    const REMEMBERS: bool;
+
+    /// What of the law it needs to know of a vector of elements.
+    type Local<R: Real>: Copy;
+
+    /// Of elements at rest.
+    fn at_rest<R: Real>() -> Self::Local<R>;
+
+    /// Of elements in this state.
+    fn of_law<R: Real>(local: &LawState<R>) -> Self::Local<R>;
+
+    /// The first Piola-Kirchhoff stress, Pa, from the law's `p1` and `s` ([`Deformation::stress`]). Called once for each
+    /// vector of elements, those from place `first` of a tile on, of which `element` gives the mesh element in a lane.
+    fn stress<R: Real, T>(
+        &mut self,
+        place: (&T, usize),
+        element: impl Fn(usize) -> usize,
+        deformation: &Deformation<R>,
+        scalars: [R; 2],
+        local: &Self::Local<R>,
+    ) -> Matrix<R>;
+}
+
+/// The stress depends on the present alone.
+#[derive(Clone, Copy)]
+pub struct Elastic;
+
+impl Past for Elastic {
+    const REMEMBERS: bool = false;
+
+    type Local<R: Real> = ();
+
+    #[inline(always)]
+    fn at_rest<R: Real>() {}
+
+    #[inline(always)]
+    fn of_law<R: Real>(_: &LawState<R>) {}
+
+    #[inline(always)]
+    fn stress<R: Real, T>(
+        &mut self,
+        _: (&T, usize),
+        _: impl Fn(usize) -> usize,
+        deformation: &Deformation<R>,
+        [p1, s]: [R; 2],
+        (): &(),
+    ) -> Matrix<R> {
+        deformation.stress(p1, s)
+    }
+}
+
+/// The series of all tissues, and how far a step goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Series<'a> {
+    /// By tissue; those that are not listed do not relax.
+    pub(crate) tissues: &'a [Prony],
+    /// The tissue of each mesh element; nothing where there is one.
+    pub(crate) of_element: &'a [u16],
+    /// Terms of the tissue that has most.
+    pub(crate) terms: usize,
+    /// `h` and `h'`, s.
+    pub(crate) halves: [f32; 2],
+    /// Number of the step, which chooses the part of a unit.
+    pub(crate) step: u64,
+}
+
+/// Tissue that relaxes: [`Series`] with the memory of its elements.
+pub(crate) struct Relaxing<'a> {
+    series: Series<'a>,
+    /// Of a term, if all elements are of one tissue: `g`, and `1 - e^(-h / tau)` of the first half and of both.
+    alike: Option<[[f32; 3]; MOST_TERMS]>,
+    /// A part of about a unit in the last place, over the number itself.
+    part: f32,
+    /// Where the table of tiles begins in memory.
+    table: usize,
+    before: &'a [[f32; TILE]],
+    after: &'a mut [[f32; TILE]],
+    /// The first tile whose memory is in `after`.
+    own: usize,
+}
+
+impl<'a> Relaxing<'a> {
+    /// For elements in the tiles of a table: what they remember before the step, and after it for those from tile `own`
+    /// on that are written here.
+    pub(crate) fn new<T>(
+        series: Series<'a>,
+        table: &[T],
+        before: &'a [NodeVector],
+        after: &'a mut [NodeVector],
+        own: usize,
+    ) -> Self {
+        /// Multiples of the golden ratio and of the root of two spread evenly, however many there are.
+        const SPREAD: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0x6a09_e667_f3bc_c909];
+        let evenly = |by: u64| (series.step.wrapping_mul(by) >> 40) as f32 / (1_u32 << 24) as f32 - 0.5;
+        // The sum of two has no mean error where a unit is not what it is taken for, as one alone has.
+        let part = f32::EPSILON * (evenly(SPREAD[0]) + evenly(SPREAD[1]));
+        let alike = match series.tissues {
+            [tissue] if series.of_element.is_empty() => Some(core::array::from_fn(|term| {
+                let [first, both] = series.spans().map(|span| -libm::expm1f(-span * tissue.rate(term)));
+                [tissue.share(term), first, both]
+            })),
+            _ => None,
+        };
+        let (before, after): (&[f32], &mut [f32]) = (must_cast_slice(before), bytemuck::must_cast_slice_mut(after));
+        let (before, after) = (before.as_chunks().0, after.as_chunks_mut().0);
+        Self { series, alike, part, table: table.as_ptr().addr(), before, after, own }
+    }
+
+    /// `g`, and `1 - e^(-h / tau)` of the first half and of both, of a term of a vector of elements.
+    #[inline(always)]
+    fn of_term<R: Real>(&self, term: usize, element: &impl Fn(usize) -> usize) -> [R; 3] {
+        if let Some(alike) = &self.alike {
+            return alike[term % MOST_TERMS].map(R::splat);
+        }
+        let Series { tissues, of_element, .. } = self.series;
+        let tissue = |lane: usize| {
+            let tissue = of_element.get(element(lane)).copied().unwrap_or_default();
+            tissues.get(usize::from(tissue)).copied().unwrap_or(Prony::NONE)
+        };
+        let share = R::from_fn(|lane| tissue(lane).share(term));
+        let rate = R::from_fn(|lane| tissue(lane).rate(term));
+        let [first, both] = self.series.spans().map(|span| relaxed_part(rate * R::splat(span)));
+        [share, first, both]
+    }
+}
+
+impl Series<'_> {
+    /// `h` and `h + h'`, s; finite, so that a rate of zero makes no NaN of it.
+    fn spans(&self) -> [f32; 2] {
+        let [first, second] = self.halves;
+        [first, first + second].map(|span| span.min(f32::MAX))
+    }
+}
+
+/// `1 - e^(-x)` for `x` from zero on, to within a few units in the last place.
+#[inline(always)]
+fn relaxed_part<R: Real>(x: R) -> R {
+    /// Below, the series.
+    const SMALL: f32 = 0.1;
+    let c = R::splat;
+    let sum = x.fused(c(-1.0 / 120.0), c(1.0 / 24.0));
+    let sum = x.fused(-sum, c(1.0 / 6.0));
+    let sum = x.fused(-sum, c(0.5));
+    let series = x * x.fused(-sum, c(1.0));
+    (c(SMALL) - x).choose(series, c(1.0) - (-x).exp())
+}
+
+/// The place of an item in the table that begins at address `table`.
+#[inline(always)]
+fn place_of<T>(table: usize, item: &T) -> usize {
+    core::ptr::from_ref(item).addr().wrapping_sub(table) / size_of::<T>().max(1)
+}
+
+/// What relaxation needs to know of the law.
+#[derive(Clone, Copy)]
+pub(crate) struct Distortion<R> {
+    /// `2 W' / J^2`, Pa, and `J^(-2/3)`.
+    scale: R,
+    factor: R,
+    /// `J - 1` and `1 / J`, `J` no less than [`crate::material::J_FLOOR`].
+    change: R,
+    inverse: R,
+}
+
+impl<R: Real> Distortion<R> {
+    /// `J^2 A / (2 W')` from `M = cof F - I` without cancellation: `J^2 I - I1 / 3 N^T N` with `N = I + M`.
+    #[inline(always)]
+    fn shape(&self, m: &Matrix<R>, i: R) -> [R; COMPONENTS] {
+        let strain = i * R::splat(1.0 / 3.0);
+        let factor = -(R::splat(1.0) + strain);
+        let diagonal = self.change.fused(self.change, (self.change + self.change) - strain);
+        let mut shape = [factor; COMPONENTS];
+        for (component, [i, j]) in PAIRS.into_iter().enumerate() {
+            let square =
+                m[0][i].fused(m[0][j], m[1][i].fused(m[1][j], m[2][i].fused(m[2][j], m[i][j] + m[j][i])));
+            shape[component] = if i == j { factor.fused(square, diagonal) } else { factor * square };
+        }
+        shape
+    }
+}
+
+impl Relaxing<'_> {
+    /// `sum_i Q_i` at present, from the memory of a vector of elements and `A = scale shape` (Pa), and the memory after
+    /// the step.
+    #[inline(always)]
+    fn relax<R: Real, T>(
+        &mut self,
+        (tile, first): (&T, usize),
+        element: impl Fn(usize) -> usize,
+        scale: R,
+        shape: &[R; COMPONENTS],
+    ) -> [R; COMPONENTS] {
+        let tile = place_of(self.table, tile);
+        let (part, terms) = (R::splat(self.part), self.series.terms.min(MOST_TERMS));
+        let mut sum = [R::splat(0.0); COMPONENTS];
+        for term in 0..terms {
+            let [share, at_step, over_step] = self.of_term::<R>(term, &element);
+            let driving = share * scale;
+            let rows = COMPONENTS * (terms * tile + term);
+            let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
+            let own = rows.wrapping_sub(COMPONENTS * terms * self.own);
+            let after: Option<&mut [_; COMPONENTS]> = self.after.get_mut(own..).and_then(|rows| rows.first_chunk_mut());
+            let Some(before) = before else { continue };
+            let mut next = [R::splat(0.0); COMPONENTS];
+            for component in 0..COMPONENTS {
+                let q = vector_at::<R>(&before[component], first);
+                let missing = driving.fused(shape[component], -q);
+                sum[component] = at_step.fused(missing, sum[component] + q);
+                next[component] = q + over_step.fused(missing, part * q);
+            }
+            if let Some(after) = after {
+                for component in 0..COMPONENTS {
+                    write_at(&mut after[component], first, next[component]);
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl Past for Relaxing<'_> {
+    const REMEMBERS: bool = true;
+
+    type Local<R: Real> = Distortion<R>;
+
+    #[inline(always)]
+    fn at_rest<R: Real>() -> Distortion<R> {
+        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        Distortion { scale: zero, factor: one, change: zero, inverse: one }
+    }
+
+    #[inline(always)]
+    fn of_law<R: Real>(local: &LawState<R>) -> Distortion<R> {
+        let ([factor, ..], [change, inverse]) = (local.volume_factor(), local.clamped_volume());
+        Distortion { scale: (local.slope + local.slope) * (inverse * inverse), factor, change, inverse }
+    }
+
+    /// With `q = -J^(-2/3) sum_i Q_i` the stress is `p1 (F - N) + (s - C:q / (3 J)) N + F q`. Every product below is small
+    /// at small strain.
+    #[inline(always)]
+    fn stress<R: Real, T>(
+        &mut self,
+        place: (&T, usize),
+        element: impl Fn(usize) -> usize,
+        deformation: &Deformation<R>,
+        [p1, s]: [R; 2],
+        local: &Distortion<R>,
+    ) -> Matrix<R> {
+        let h = deformation.h;
+        let mut m = h;
+        for i in 0..3 {
+            for j in 0..3 {
+                m[i][j] = deformation.cofactor_change(i, j);
+            }
+        }
+        let i1 = deformation.invariants.i;
+        let sum = self.relax(place, element, local.scale, &local.shape(&m, i1));
+        let minus = -local.factor;
+        let [xx, yy, zz, xy, yz, zx] = sum.map(|component| minus * component);
+        let q = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
+        let inner = [[xx + p1, xy, zx], [xy, yy + p1, yz], [zx, yz, zz + p1]];
+        let mut stress = q;
+        // F:(p1 H) is known: what is left of F:stress is C:q.
+        let mut across = [-(p1 * (i1 - deformation.trace)), zx, zx];
+        for i in 0..3 {
+            for j in 0..3 {
+                stress[i][j] = h[i][0].fused(inner[0][j], h[i][1].fused(inner[1][j], h[i][2].fused(inner[2][j], q[i][j])));
+            }
+            let row = dot(h[i], stress[i]) + stress[i][i];
+            across[i] = if i == 0 { across[i] + row } else { row };
+        }
+        let across = across[0] + (across[1] + across[2]);
+        let s = (local.inverse * R::splat(-1.0 / 3.0)).fused(across, s);
+        let along = s - p1;
+        for i in 0..3 {
+            for j in 0..3 {
+                stress[i][j] = along.fused(m[i][j], stress[i][j]);
+            }
+            stress[i][i] = stress[i][i] + s;
+        }
+        stress
+    }
+}
