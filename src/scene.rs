@@ -68,6 +68,11 @@ pub(crate) fn tissue_count(material: &impl Material) -> usize {
     }
 }
 
+/// Terms of the tissue that relaxes with most.
+fn terms_of(material: &impl Material) -> usize {
+    material.prony().iter().map(Prony::terms).max().unwrap_or(0)
+}
+
 /// CRC32 of all tables, to tell scenes of the same size apart.
 fn checksum(element: Element, nodes: &[NodeInertia], tiles: &[ElementTile]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
@@ -204,7 +209,7 @@ impl SceneFacts {
             rounding_energy,
             checksum,
             has_point_masses: false,
-            terms: material.prony().iter().map(Prony::terms).max().unwrap_or(0),
+            terms: terms_of(material),
         })
     }
 

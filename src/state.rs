@@ -530,6 +530,12 @@ impl VecState {
         state
     }
 
+    /// Takes over what tissue remembers, in two copies of which the first is that of now.
+    #[cfg(feature = "std")]
+    pub(crate) fn remember(&mut self, memory: std::vec::Vec<NodeVector>) {
+        (self.vectors.memory, self.progress.second) = (memory, false);
+    }
+
     /// The same with room for what instruments do on a surface.
     #[must_use]
     pub fn meeting(mut self, surface: &Surface<'_>) -> Self {

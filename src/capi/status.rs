@@ -176,6 +176,8 @@ pub enum supple_status {
     SUPPLE_E_NO_CONTACT = -95,
     /// The step was not taken: learned steps do not know pulls.
     SUPPLE_E_NO_PULLS = -96,
+    /// The step was not taken: learned steps do not know tissue that relaxes.
+    SUPPLE_E_NO_RELAXATION = -97,
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
     SUPPLE_E_DIVERGED_PRESSURE = -98,
@@ -475,6 +477,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
+        -97 => c"the step was not taken: this kind of step does not know tissue that relaxes",
         _ => return None,
     })
 }

@@ -7,11 +7,13 @@ use std::vec;
 use std::vec::Vec;
 
 use super::owned::{Exact, Prepared};
+use super::remembered::carried;
 use super::{Simulation, SimulationError};
-use crate::material::{AnyLaw, Law, TissueValues, Values, VecMaterial};
+use crate::material::{AnyLaw, Law, Prony, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
 use crate::pulls::let_go_of_removed;
 use crate::scene::BuildError;
+use crate::simd::NodeVector;
 use crate::tled;
 
 /// How often an ablation changes the constants.
@@ -57,11 +59,13 @@ impl Simulation<'_> {
                 let undo = |simulation: &mut Self| {
                     let _ = simulation.scene.set_constants(former);
                 };
-                return self.go_on(undo);
+                let remembered = self.state.view().copies_of_memory()[0].to_vec();
+                return self.go_on([remembered.clone(), remembered].concat(), undo);
             }
         }
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?.without(&all)?;
         let scene = self.scene.exchanged(material, &mesh)?;
+        let remembered = carried(self.scene.view(), scene.view(), self.state.view().copies_of_memory()[0]);
         let former = core::mem::replace(&mut self.scene, scene);
         let removed = core::mem::replace(&mut self.changes.removed, all);
         let touchable = self.touchable.clone();
@@ -71,7 +75,7 @@ impl Simulation<'_> {
             (simulation.pulled, simulation.pulls) = (pulled, pulls);
             (simulation.changes.removed, simulation.changes.meets_boundary) = (removed, is_boundary);
         };
-        self.go_on(undo)
+        self.go_on(remembered, undo)
     }
 
     /// Removes elements, as a resection does: see [`Simulation::exchange`].
@@ -111,6 +115,10 @@ impl Simulation<'_> {
             let number = *part.get_or_insert_with(|| {
                 let number = material.tissues.len();
                 material.tissues.push(tissue);
+                if let Some(&series) = material.prony.get(usize::from(*place)) {
+                    material.prony.resize(number, Prony::NONE);
+                    material.prony.push(series);
+                }
                 ablations.push(Ablation { tissue: number, from: tissue.constants, to, start, seconds, stage: 0 });
                 number
             });
@@ -188,8 +196,9 @@ impl Simulation<'_> {
     }
 
     /// Goes on in the scene that there is now, or undoes what has led to it.
-    fn go_on(&mut self, undo: impl FnOnce(&mut Self)) -> Result<(), SimulationError> {
+    fn go_on(&mut self, remembered: Vec<NodeVector>, undo: impl FnOnce(&mut Self)) -> Result<(), SimulationError> {
         let (state, prepared) = (self.state.clone(), self.prepared.take());
+        self.state.remember(remembered);
         let was_prepared = prepared.is_some();
         let answer = self.go_on_prepared(was_prepared);
         if answer.is_err() {

@@ -21,6 +21,8 @@ mod exchange;
 mod mover;
 #[cfg(feature = "std")]
 mod owned;
+#[cfg(feature = "std")]
+mod remembered;
 mod report;
 #[cfg(feature = "std")]
 mod settle;

@@ -57,7 +57,7 @@ pub enum Cause {
     NoPulls,
     /// The tissue relaxes, which learned steps do not know, others only with room for what it remembers
     /// ([`StateView::remembering`](crate::state::StateView::remembering)).
-    NoMemory,
+    NoRelaxation,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
         /// How far, m.
@@ -114,7 +114,7 @@ impl fmt::Display for Divergence {
                     "stopped at {time:.6} s: the loads have pulls, which this step does not know, or has no room for their forces"
                 )
             }
-            Cause::NoMemory => {
+            Cause::NoRelaxation => {
                 write!(
                     f,
                     "stopped at {time:.6} s: the tissue relaxes (prony), which this step does not know, or has no room for \

@@ -213,7 +213,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         if remembered > 0 {
             if !C::RELAXES || self.memory.len() < remembered {
                 let time = self.progress.time;
-                return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoMemory });
+                return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoRelaxation });
             }
             self.halves = if C::IS_RELAXED { [f32::INFINITY, 0.0] } else { [self.progress.half, 0.5 * step.seconds()] };
         }
