@@ -21,6 +21,8 @@ const MOST_LOOKS: u32 = 5_000;
 const MOST_SPANS: u32 = 100;
 /// Steps over those at the critical step of the start, at most: tissue that collapses takes ever shorter ones.
 const MOST_STEPS: f64 = 10.0;
+/// At most so many steps to rest of tissue that relaxes.
+const MOST_STEPS_TO_SETTLE: u32 = 200_000;
 
 /// Why a body did not come to rest.
 pub(crate) enum Unrest {
@@ -65,6 +67,9 @@ impl Unrest {
 /// its end do not matter.
 pub(crate) fn at_rest(setup: &Setup, from: Option<&[[f32; 3]]>, metre: f64) -> Result<Vec<[f32; 3]>, Unrest> {
     let mut resting = Resting::new(setup, from)?;
+    if setup.tissues.relax() {
+        return resting.settled(metre);
+    }
     let Some(omega) = resting.frequency(metre)? else { return Ok(resting.displacements()) };
     resting.damping = 2.0 * omega as f32;
     let (mut latest, mut before) = (resting.displacements(), f64::INFINITY);
@@ -121,6 +126,19 @@ impl<'a> Resting<'a> {
             resting.advance(ramp)?;
         }
         Ok(resting)
+    }
+
+    /// The displacements at rest of tissue that has had all the time to relax.
+    fn settled(&mut self, metre: f64) -> Result<Vec<[f32; 3]>, Unrest> {
+        let Self { setup, simulation, limits, .. } = self;
+        let pulls = setup.pulls.at(simulation.state().time(), limits);
+        let mut loads = setup.acting(setup.loads(simulation.scene())?, &[], &pulls)?;
+        let settled = simulation.settle_under(metre as f32, MOST_STEPS_TO_SETTLE, &mut loads).map_err(Problem::of)?;
+        match settled.status {
+            Status::Diverged(divergence) => Err(Unrest::Diverged(divergence)),
+            _ if settled.at_rest => Ok(self.displacements()),
+            _ => Err(Unrest::Moves(settled.remaining.into())),
+        }
     }
 
     /// Moves on by so many seconds.

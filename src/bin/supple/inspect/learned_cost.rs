@@ -27,7 +27,7 @@ pub(crate) fn describe(
 ) -> Result<(), Problem> {
     let nodes = scene.node_count();
     let mut learned = choice.step(nodes, false)?;
-    let mut state = setup.state();
+    let mut state = setup.state(scene);
     let mut spent = Duration::ZERO;
     for _ in 0..TIMED {
         let start = Instant::now();

@@ -34,7 +34,7 @@ impl Times {
     ) -> Result<Self, Problem> {
         let mut walker = Walker::new(method, setup, scene, TIMED_MULTIPLE * bound.seconds)?;
         let step = Step::unchecked(0.5 * bound.seconds, setup.damping).map_err(Problem::of)?;
-        let mut state = setup.state();
+        let mut state = setup.state(scene);
         let (mut exact, mut long) = (vec![], vec![]);
         for _ in 0..TIMED {
             exact.push(timed(|| tled::step(&scene, loads, &mut state, &step)));
@@ -70,7 +70,7 @@ impl Walker {
         seconds: f32,
     ) -> Result<Self, Problem> {
         let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
-        let mut state = setup.state();
+        let mut state = setup.state(scene);
         let step = LargeStep::prepare_in_vec(method.clone(), scene, &setup.body.local, state.view(), step)
             .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
         Ok(Self { state, step })

@@ -5,7 +5,7 @@ use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::pressure::VecPressure;
 use supple::pulls::Pull;
-use supple::scene::{AsScene, BuildError, Support, VecScene};
+use supple::scene::{AsScene, BuildError, Support, SceneView, VecScene};
 use supple::simulation::Simulation;
 use supple::state::VecState;
 
@@ -77,6 +77,10 @@ impl Setup {
         warnings.extend(pulls.warnings(file, &supports));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
+            if tissues.relax() {
+                let message = "learned steps do not know tissue that relaxes; remove prony, or take another method";
+                return Err(file.problem(&scene.material, message));
+            }
         }
         Ok(Self {
             body,
@@ -129,7 +133,9 @@ impl Setup {
 
     /// The kernel's scene, and a state at rest.
     pub fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
-        Ok((self.scene()?, self.state()))
+        let scene = self.scene()?;
+        let state = self.state(scene.view());
+        Ok((scene, state))
     }
 
     fn scene(&self) -> Result<VecScene<VecMaterial>, Problem> {
@@ -148,9 +154,9 @@ impl Setup {
         Ok(simulation)
     }
 
-    /// A state at rest.
-    pub(crate) fn state(&self) -> VecState {
-        let mut state = VecState::at_rest(self.body.local.len());
+    /// A state of the scene at rest.
+    pub(crate) fn state(&self, scene: SceneView<'_, VecMaterial>) -> VecState {
+        let mut state = VecState::of(scene);
         self.make_room(&mut state);
         state
     }

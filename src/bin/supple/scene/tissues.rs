@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use supple::material::{AnyLaw, Element, Law, Moduli, Tissue, VecMaterial};
+use supple::material::{AnyLaw, Element, Law, Moduli, Prony, Tissue, VecMaterial};
 use supple::mlp::Recipe;
 use supple::plausibility::same;
 use toml::Spanned;
@@ -18,6 +18,8 @@ use crate::problem::Problem;
 pub struct Tissues {
     /// That of `[material]`, then of each region.
     tissues: Vec<Tissue<AnyLaw>>,
+    /// How each relaxes.
+    prony: Vec<Prony>,
     /// For each element the index of its tissue; empty if all are of one.
     of_element: Vec<u16>,
 }
@@ -25,18 +27,19 @@ pub struct Tissues {
 impl Tissues {
     /// The same everywhere.
     pub(crate) fn one(tissue: Tissue<AnyLaw>) -> Self {
-        Self { tissues: vec![tissue], of_element: vec![] }
+        Self { tissues: vec![tissue], prony: vec![Prony::NONE], of_element: vec![] }
     }
 
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
-        let material = Table::new(file, &file.scene.material, &["law", "density"])?;
+        let material = Table::new(file, &file.scene.material, &["law", "density", "prony"])?;
         let law = read_law(file, &material.required("law")?)?;
         let density = material.required("density")?;
         let base = Tissue { law: material.constants(law, true)?, density: positive(file, "density", &density)? };
         let mut tissues = vec![base];
+        let mut prony = vec![material.prony()?.unwrap_or(Prony::NONE)];
         let mut of_element = vec![0; body.mesh.tets.len()];
         for at in &file.scene.region {
-            let region = Table::new(file, at, &["tags", "plane", "box", "density"])?;
+            let region = Table::new(file, at, &["tags", "plane", "box", "density", "prony"])?;
             let law = region.constants(base.law, false)?;
             let density = match region.get("density")? {
                 Some(density) => positive(file, "density", &density)?,
@@ -48,8 +51,9 @@ impl Tissues {
                 of_element[element] = index;
             }
             tissues.push(Tissue { law, density });
+            prony.push(region.prony()?.unwrap_or(prony[0]));
         }
-        Ok(Self { tissues, of_element })
+        Ok(Self { tissues, prony, of_element })
     }
 
     /// The tissue, if there is only one.
@@ -85,11 +89,17 @@ impl Tissues {
         self.tissues.iter().all(same_tissue)
     }
 
+    /// Whether some of them relaxes.
+    pub(crate) fn relax(&self) -> bool {
+        self.prony.iter().any(|series| *series != Prony::NONE)
+    }
+
     /// What a scene of these tissues in these tetrahedra is made of.
     pub(crate) fn material(&self, element: Element) -> VecMaterial {
         let law = self.tissues[0].law;
         let tissues = self.tissues.iter().map(Tissue::values).collect();
-        VecMaterial { element, law, tissues, of_element: self.of_element.clone(), prony: vec![] }
+        let prony = if self.relax() { self.prony.clone() } else { vec![] };
+        VecMaterial { element, law, tissues, of_element: self.of_element.clone(), prony }
     }
 }
 
@@ -172,6 +182,13 @@ impl<'a> Table<'a> {
             }
         }
         Ok(law.with(values))
+    }
+
+    /// The terms of relaxation, if they are given: an empty list is none.
+    fn prony(&self) -> Result<Option<Prony>, Problem> {
+        let Some(terms) = self.get::<Vec<[f32; 2]>>("prony")? else { return Ok(None) };
+        let series = Prony::new(terms.get_ref());
+        series.map(Some).map_err(|error| self.file.problem(&terms, format!("{error} (prony = [[share, seconds], ...])")))
     }
 
     /// The elements of a region, by tag or by their middle; none is an error.
