@@ -13,7 +13,7 @@ use core::ops::{Deref, Range};
 
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
-    Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
+    Remembered, Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli, Prony};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -530,9 +530,15 @@ impl<'a, M: Material> SceneView<'a, M> {
         VolumeRows { rows, several_tissues: self.material.laws().has_several_tissues() }
     }
 
-    /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
-    pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
-        self.strain_energy_at(0..self.energy_places(), displacement, volumes)
+    /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them, and of
+    /// tissue that relaxes with that of what it remembers.
+    pub(crate) fn strain_energy(
+        self,
+        displacement: &[NodeVector],
+        volumes: &[NodeVector],
+        memory: &[NodeVector],
+    ) -> f64 {
+        self.strain_energy_at(0..self.energy_places(), displacement, volumes, memory)
     }
 
     /// The places at which there is strain energy: of elements, and of patches around nodes.
@@ -551,7 +557,9 @@ impl<'a, M: Material> SceneView<'a, M> {
         places: Range<usize>,
         displacement: &[NodeVector],
         volumes: &[NodeVector],
+        memory: &[NodeVector],
     ) -> f64 {
+        let remembered = self.series([0.0; 2], 0).map(|series| Remembered { series, memory });
         let laws = self.material.laws();
         let volumes = self.element().is_nodal_pressure().then(|| self.volume_rows(volumes));
         let tiles = self.energy_tiles().max(1);
@@ -562,14 +570,16 @@ impl<'a, M: Material> SceneView<'a, M> {
                 return if tile.volume::<f32>(lane) <= 0.0 {
                     0.0
                 } else if self.element().is_nodal_strain() {
-                    stabilising_energy(&law, tile, lane, displacement)
+                    stabilising_energy(&law, tile, lane, displacement, remembered)
                 } else {
-                    element_energy(&law, tile, lane, displacement, volumes)
+                    element_energy(&law, (tile, [at, lane]), displacement, volumes, remembered)
                 };
             }
-            match self.patches.tiles().get(at - self.tiles.len()) {
+            let patch = at - self.tiles.len();
+            match self.patches.tiles().get(patch) {
                 Some(tile) if tile.volume(lane) > 0.0 => {
-                    patch_energy(&laws.of(tile.element(lane)), self.patches, tile, lane, displacement)
+                    let law = laws.of(tile.element(lane));
+                    patch_energy(&law, self.patches, (tile, [patch, lane]), displacement, remembered)
                 }
                 _ => 0.0,
             }

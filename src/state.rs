@@ -93,8 +93,7 @@ impl Progress {
     }
 
     /// At rest, at time zero.
-    pub const START: Self =
-        Self::resumed(0.0, 0, 0.0, EnergyBalance::NEW);
+    pub const START: Self = Self::resumed(0.0, 0, 0.0, EnergyBalance::NEW);
 
     /// A simulation that goes on from here; its displacements, remainders and increments are the caller's to restore.
     #[must_use]

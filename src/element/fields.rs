@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 
 use super::barrier;
 use super::patch_forces::STABILISATION;
-use super::{ElementTile, PatchTile, Patches, VolumeRows};
+use super::{ElementTile, PatchTile, Patches, Remembered, VolumeRows};
 use crate::material::{Invariants, Law, Potential, energy_density, response};
 use crate::simd::NodeVector;
 
@@ -48,17 +48,21 @@ fn displacements(vectors: &[NodeVector]) -> impl Fn(usize) -> DVec3 {
     |node| DVec3::from_array(vectors.get(node).copied().unwrap_or_default().to_array().map(f64::from))
 }
 
-/// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure.
+/// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure, and with what the tissue
+/// remembers at `place` if it relaxes.
 pub(crate) fn element_energy<L: Law>(
     law: &L,
-    tile: &ElementTile,
-    lane: usize,
+    (tile, place): (&ElementTile, [usize; 2]),
     displacement: &[NodeVector],
     volumes: Option<VolumeRows<'_>>,
+    remembered: Option<Remembered<'_>>,
 ) -> f64 {
-    let (i, j, _) = invariants(gradient_of(tile, lane, displacements(displacement)));
+    let [_, lane] = place;
+    let h = gradient_of(tile, lane, displacements(displacement));
+    let (i, j, _) = invariants(h);
     let of_nodes = volumes.map_or(0.0, |volumes| volume_energy_difference(law, tile, lane, j, volumes));
-    energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane)) + of_nodes
+    let of_past = remembered.map_or(0.0, |of| of.energy_density(law, place, tile.element(lane), h));
+    (energy_density(law, i, j) + of_past) * f64::from(tile.volume::<f32>(lane)) + of_nodes
 }
 
 /// Fields of the element at place `lane` of a tile, under the given displacements (m).
@@ -127,17 +131,32 @@ pub(crate) fn stabilising_modulus<L: Law>(law: &L) -> f64 {
 pub(crate) fn patch_energy<L: Law>(
     law: &L,
     patches: Patches<'_>,
-    tile: &PatchTile,
-    lane: usize,
+    (tile, place): (&PatchTile, [usize; 2]),
     displacement: &[NodeVector],
+    remembered: Option<Remembered<'_>>,
 ) -> f64 {
+    let [_, lane] = place;
     let h = tile.gradient(patches.neighbours_of(tile), lane, displacements(displacement));
     let (i, j, square) = invariants(h);
-    tile.volume(lane) * (energy_density(law, i, j) - 0.5 * stabilising_modulus(law) * square)
+    let of_past = remembered.map_or(0.0, |of| of.energy_density(law, place, tile.element(lane), h));
+    let modulus = stabilising_modulus(law) * stays(remembered, tile.element(lane));
+    tile.volume(lane) * (energy_density(law, i, j) + of_past - 0.5 * modulus * square)
 }
 
 /// What an element adds to it, J: where it is crushed also the energy of [`super::barrier`].
-pub(crate) fn stabilising_energy<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: &[NodeVector]) -> f64 {
+pub(crate) fn stabilising_energy<L: Law>(
+    law: &L,
+    tile: &ElementTile,
+    lane: usize,
+    displacement: &[NodeVector],
+    remembered: Option<Remembered<'_>>,
+) -> f64 {
+    let modulus = stabilising_modulus(law) * stays(remembered, tile.element(lane));
     let (i, j, square) = invariants(gradient_of(tile, lane, displacements(displacement)));
-    f64::from(tile.volume::<f32>(lane)) * (0.5 * stabilising_modulus(law) * square + barrier::energy_density(law, i, j))
+    f64::from(tile.volume::<f32>(lane)) * (0.5 * modulus * square + barrier::energy_density(law, i, j))
+}
+
+/// The share of the stabilising modulus that stays.
+fn stays(remembered: Option<Remembered<'_>>, element: usize) -> f64 {
+    remembered.map_or(1.0, |of| of.series.stabilising(element).into())
 }

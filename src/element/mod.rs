@@ -26,6 +26,7 @@ mod patch_forces;
 mod patch_tangents;
 mod pressure;
 mod relaxation;
+mod relaxation_energy;
 mod stiffness_bound;
 #[cfg(test)]
 mod stiffness_bound_tests;
@@ -63,6 +64,7 @@ pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRow
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use relaxation::{Elastic, Relaxing, Series, VECTORS_OF_TERM};
+pub(crate) use relaxation_energy::Remembered;
 pub(crate) use stiffness_bound::ScalarBound;
 pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
 

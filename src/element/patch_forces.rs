@@ -77,7 +77,8 @@ fn add_all<R: Real, L: Law, V: ElementVisitor, K: Past, const PARTS: usize>(
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress = stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut past, &mut extremes);
+            *stress =
+                stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut past, &mut extremes);
         }
         scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
     }
@@ -130,13 +131,14 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Past>(
     extremes.saturation = response.saturation.max(extremes.saturation);
     let modulus = modulus_of::<R, L>(&law);
     let (place, element) = ((tile, first), |lane| tile.element(first + lane));
+    let stabilising = past.stabilising(modulus, element);
     let mut p = past.stress(place, element, &deformation, [response.p1, response.s], &K::of_law(&local));
     for i in 0..3 {
         for j in 0..3 {
-            p[i][j] = p[i][j] - modulus * h[i][j];
+            p[i][j] = p[i][j] - stabilising * h[i][j];
         }
     }
-    let own = [modulus * pull[0], modulus * pull[1], modulus * pull[2]];
+    let own = [stabilising * pull[0], stabilising * pull[1], stabilising * pull[2]];
     let stress = Stress { p, own, ..Stress::zero() };
     if !V::BOUNDS_PATCHES {
         return stress;

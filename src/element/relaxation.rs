@@ -34,11 +34,14 @@ use super::deformation::{Deformation, Matrix};
 use super::tile::{vector_at, write_at};
 
 /// Components of a symmetric matrix: xx, yy, zz, xy, yz, zx.
-const COMPONENTS: usize = 6;
+pub(super) const COMPONENTS: usize = 6;
 const PAIRS: [[usize; 2]; COMPONENTS] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
 
 /// Vectors of one copy of the memory of a term of a tile.
 pub(crate) const VECTORS_OF_TERM: usize = COMPONENTS * TILE / 4;
+
+/// Least share of the stabilising energy of nodal strain that stays, see [`Past::stabilising`] of [`Relaxing`].
+const LEAST_STABILISING: f32 = 0.5;
 
 /// What the stress of elements knows of the past.
 pub(crate) trait Past {
@@ -53,6 +56,9 @@ pub(crate) trait Past {
 
     /// Of elements in this state.
     fn of_law<R: Real>(local: &LawState<R>) -> Self::Local<R>;
+
+    /// The modulus of the stabilising energy of nodal strain, Pa, from that of the law.
+    fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R;
 
     /// The first Piola-Kirchhoff stress, Pa, from the law's `p1` and `s` ([`Deformation::stress`]). Called once for each
     /// vector of elements, those from place `first` of a tile on, of which `element` gives the mesh element in a lane.
@@ -80,6 +86,11 @@ impl Past for Elastic {
 
     #[inline(always)]
     fn of_law<R: Real>(_: &LawState<R>) {}
+
+    #[inline(always)]
+    fn stabilising<R: Real>(&self, modulus: R, _: impl Fn(usize) -> usize) -> R {
+        modulus
+    }
 
     #[inline(always)]
     fn stress<R: Real, T>(
@@ -157,19 +168,26 @@ impl<'a> Relaxing<'a> {
         if let Some(alike) = &self.alike {
             return alike[term % MOST_TERMS].map(R::splat);
         }
-        let Series { tissues, of_element, .. } = self.series;
-        let tissue = |lane: usize| {
-            let tissue = of_element.get(element(lane)).copied().unwrap_or_default();
-            tissues.get(usize::from(tissue)).copied().unwrap_or(Prony::NONE)
-        };
-        let share = R::from_fn(|lane| tissue(lane).share(term));
-        let rate = R::from_fn(|lane| tissue(lane).rate(term));
+        let share = R::from_fn(|lane| self.series.of(element(lane)).share(term));
+        let rate = R::from_fn(|lane| self.series.of(element(lane)).rate(term));
         let [first, both] = self.series.spans().map(|span| relaxed_part(rate * R::splat(span)));
         [share, first, both]
     }
 }
 
 impl Series<'_> {
+    /// The share of the stabilising modulus of mesh element `element` that stays.
+    pub(super) fn stabilising(&self, element: usize) -> f32 {
+        (1.0 - self.of(element).relaxed()).max(LEAST_STABILISING)
+    }
+
+    /// That of mesh element `element`.
+    #[inline(always)]
+    pub(super) fn of(&self, element: usize) -> Prony {
+        let tissue = self.of_element.get(element).copied().unwrap_or_default();
+        self.tissues.get(usize::from(tissue)).copied().unwrap_or(Prony::NONE)
+    }
+
     /// `h` and `h + h'`, s; finite, so that a rate of zero makes no NaN of it.
     fn spans(&self) -> [f32; 2] {
         let [first, second] = self.halves;
@@ -216,8 +234,7 @@ impl<R: Real> Distortion<R> {
         let diagonal = self.change.fused(self.change, (self.change + self.change) - strain);
         let mut shape = [factor; COMPONENTS];
         for (component, [i, j]) in PAIRS.into_iter().enumerate() {
-            let square =
-                m[0][i].fused(m[0][j], m[1][i].fused(m[1][j], m[2][i].fused(m[2][j], m[i][j] + m[j][i])));
+            let square = m[0][i].fused(m[0][j], m[1][i].fused(m[1][j], m[2][i].fused(m[2][j], m[i][j] + m[j][i])));
             shape[component] = if i == j { factor.fused(square, diagonal) } else { factor * square };
         }
         shape
@@ -280,6 +297,19 @@ impl Past for Relaxing<'_> {
         Distortion { scale: (local.slope + local.slope) * (inverse * inverse), factor, change, inverse }
     }
 
+    /// That energy has no memory. It is of the tissue at rest, so that bodies rest as the softened law would, but of no
+    /// less than half the law's, as rough motion is hardly held by less. Bounds are those of the whole: what is taken off
+    /// is never negative.
+    #[inline(always)]
+    fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
+        let mut left = R::splat(1.0);
+        for term in 0..self.series.terms.min(MOST_TERMS) {
+            let [share, ..] = self.of_term::<R>(term, &element);
+            left = left - share;
+        }
+        modulus * left.max(R::splat(LEAST_STABILISING))
+    }
+
     /// With `q = -J^(-2/3) sum_i Q_i` the stress is `p1 (F - N) + (s - C:q / (3 J)) N + F q`. Every product below is small
     /// at small strain.
     #[inline(always)]
@@ -309,7 +339,8 @@ impl Past for Relaxing<'_> {
         let mut across = [-(p1 * (i1 - deformation.trace)), zx, zx];
         for i in 0..3 {
             for j in 0..3 {
-                stress[i][j] = h[i][0].fused(inner[0][j], h[i][1].fused(inner[1][j], h[i][2].fused(inner[2][j], q[i][j])));
+                stress[i][j] =
+                    h[i][0].fused(inner[0][j], h[i][1].fused(inner[1][j], h[i][2].fused(inner[2][j], q[i][j])));
             }
             let row = dot(h[i], stress[i]) + stress[i][i];
             across[i] = if i == 0 { across[i] + row } else { row };

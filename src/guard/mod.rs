@@ -157,8 +157,7 @@ impl Watch {
         let nodes = scene.node_count();
         let mut progress = Progress::START;
         let (needed, capacity) = (vectors_for(scene, points)?, storage.len());
-        let Some((mut copied, of_second)) =
-            split(scene, storage, nodes, &mut progress).filter(|_| capacity >= needed)
+        let Some((mut copied, of_second)) = split(scene, storage, nodes, &mut progress).filter(|_| capacity >= needed)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };

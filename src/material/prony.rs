@@ -62,10 +62,16 @@ impl fmt::Display for PronyError {
                 write!(f, "term {term} of the relaxation has the share {value}: it must be a positive number")
             }
             Self::Seconds { term, value } => {
-                write!(f, "term {term} of the relaxation has the time {value} s: it must be from {SHORTEST} to {LONGEST} s")
+                write!(
+                    f,
+                    "term {term} of the relaxation has the time {value} s: it must be from {SHORTEST} to {LONGEST} s"
+                )
             }
             Self::Sum { value } => {
-                write!(f, "the shares of the relaxation add up to {value}: at most {MOST_SHARE} of the stress may relax")
+                write!(
+                    f,
+                    "the shares of the relaxation add up to {value}: at most {MOST_SHARE} of the stress may relax"
+                )
             }
         }
     }

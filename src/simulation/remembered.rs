@@ -53,7 +53,8 @@ pub(super) fn carried(
         let Some(&(old_tile, old_lane)) = of_old.get(&former(key)) else { continue };
         for term in 0..before.min(after) {
             for component in 0..6 {
-                let at = |tile: usize, terms: usize, lane: usize| OF_TERM * (terms * tile + term) + TILE * component + lane;
+                let at =
+                    |tile: usize, terms: usize, lane: usize| OF_TERM * (terms * tile + term) + TILE * component + lane;
                 let value = from.get(at(old_tile, before, old_lane)).copied().unwrap_or_default();
                 if let Some(place) = to.get_mut(at(tile, after, lane)) {
                     *place = value;

@@ -38,7 +38,7 @@ use crate::element::{ElementMaterial, NodeInertia, mark_moment};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{Progress, StateView};
+use crate::state::{Progress, StateView, copies_of};
 use energy_sums::Entry;
 
 /// A step that is being computed: nothing has moved yet.
@@ -270,11 +270,13 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// The balance after this step's part of the measurement of the energy.
-    fn measured<C: StepMethod<M>>(&self, balance: EnergyBalance, method: &C) -> EnergyBalance {
+    fn measured<C: StepMethod<M>>(&mut self, balance: EnergyBalance, method: &C) -> EnergyBalance {
+        let remembered = self.memory.get_mut(..self.scene.memory_vectors()).unwrap_or_default();
+        let memory = &*copies_of(remembered, self.progress)[0];
         let Self { scene, displacement, volume, .. } = self;
         let (all, first) = (scene.energy_places(), balance.cycle.next as usize);
         let next = (first + all.div_ceil(C::ENERGY_CYCLE)).min(all);
-        let strain = scene.strain_energy_at(first..next, displacement, volume);
+        let strain = scene.strain_energy_at(first..next, displacement, volume, memory);
         let next = if next < all { Some(next as u32) } else { None };
         balance.measured(strain, next, method.added_inertia().into(), scene.rounding_energy())
     }

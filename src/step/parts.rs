@@ -47,18 +47,8 @@ impl<M: Material> Trial<'_, M> {
         let series = scene.series(self.halves, progress.steps);
         let remembered = self.memory.get_mut(..scene.memory_vectors()).unwrap_or_default();
         let [before, after] = copies_of(remembered, progress);
-        let forcing = Forcing {
-            scene,
-            visitor,
-            displacement,
-            remainder,
-            is_heated,
-            loads,
-            progress,
-            series,
-            before,
-            look_cycle,
-        };
+        let forcing =
+            Forcing { scene, visitor, displacement, remainder, is_heated, loads, progress, series, before, look_cycle };
         TotalForces { forcing, increment, volume, force, after }
     }
 }

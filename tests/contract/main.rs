@@ -12,5 +12,6 @@ mod errors;
 mod no_allocation;
 mod parts;
 mod patches;
+mod relaxation;
 mod settle;
 mod simulation;

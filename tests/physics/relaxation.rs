@@ -10,7 +10,9 @@ use supple::state::VecState;
 use supple::step::Step;
 use supple::tled;
 
-use crate::reference::tensor::{Mat3, contraction, determinant, from_fn, inverse, max_abs, product, rotation, transpose};
+use crate::reference::tensor::{
+    Mat3, contraction, determinant, from_fn, inverse, max_abs, product, rotation, transpose,
+};
 use crate::support::{Body, DENSITY, EXP, NEO, POLYNOMIAL, reference_law};
 
 const ELEMENTS: [Element; 3] = Element::ALL;

@@ -69,15 +69,13 @@ pub fn at_run_time<M: Material<Law: Into<AnyLaw>>>(material: &M) -> VecMaterial 
     let element = material.element();
     match material.laws() {
         Laws::One(law) => VecMaterial::one(element, law, material.tissue(0).expect("a tissue").density),
-        Laws::Regions { law, tissues, of_element } => {
-            VecMaterial {
-                element,
-                law: law.into(),
-                tissues: tissues.to_vec(),
-                of_element: of_element.to_vec(),
-                prony: material.prony().to_vec(),
-            }
-        }
+        Laws::Regions { law, tissues, of_element } => VecMaterial {
+            element,
+            law: law.into(),
+            tissues: tissues.to_vec(),
+            of_element: of_element.to_vec(),
+            prony: material.prony().to_vec(),
+        },
     }
 }
 

@@ -5,7 +5,7 @@ use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::pressure::VecPressure;
 use supple::pulls::Pull;
-use supple::scene::{AsScene, BuildError, Support, SceneView, VecScene};
+use supple::scene::{AsScene, BuildError, SceneView, Support, VecScene};
 use supple::simulation::Simulation;
 use supple::state::VecState;
 

@@ -188,7 +188,9 @@ impl<'a> Table<'a> {
     fn prony(&self) -> Result<Option<Prony>, Problem> {
         let Some(terms) = self.get::<Vec<[f32; 2]>>("prony")? else { return Ok(None) };
         let series = Prony::new(terms.get_ref());
-        series.map(Some).map_err(|error| self.file.problem(&terms, format!("{error} (prony = [[share, seconds], ...])")))
+        series
+            .map(Some)
+            .map_err(|error| self.file.problem(&terms, format!("{error} (prony = [[share, seconds], ...])")))
     }
 
     /// The elements of a region, by tag or by their middle; none is an error.
