@@ -21,6 +21,7 @@
 //! | [`hard`] | is a run ever wrong without a word? |
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`cost`] | what a simulated second takes, by size of mesh |
+//! | [`pulls`] | a lobe on pulls: tracked points, random ones, what they cost |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | `training` (feature `train`) | scenes to learn from; the search for a damper |
@@ -39,6 +40,7 @@ pub mod method;
 pub mod moving;
 pub mod networks;
 pub mod physics;
+pub mod pulls;
 #[path = "../train/random_numbers.rs"]
 mod random_numbers;
 pub mod run;

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use supple_cli::screen;
 
-use command::{cost, hard, methods, physics, tolerance};
+use command::{cost, hard, methods, physics, pulls, tolerance};
 #[cfg(feature = "train")]
 use command::{quantise, train};
 
@@ -37,6 +37,8 @@ enum Command {
     Tolerance(tolerance::Asked),
     /// What a simulated second takes, by size of mesh and method: cost.csv
     Cost(cost::Asked),
+    /// A lobe on pulls: errors and times of tracked points, what pulls cost, whether any run goes wrong
+    Pulls(pulls::Asked),
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]
     Train(train::Asked),
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         Command::Hard(asked) => hard::judge(&asked),
         Command::Tolerance(asked) => tolerance::judge(&asked),
         Command::Cost(asked) => cost::judge(&asked),
+        Command::Pulls(asked) => pulls::judge(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
         #[cfg(feature = "train")]

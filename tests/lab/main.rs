@@ -10,5 +10,6 @@ mod moving;
 #[cfg(feature = "slow-tests")]
 mod paper;
 mod physics;
+mod pulls;
 mod run;
 mod scenes;

@@ -6,6 +6,7 @@ mod exemplar;
 pub(crate) mod hard;
 pub(crate) mod methods;
 pub(crate) mod physics;
+pub(crate) mod pulls;
 #[cfg(feature = "train")]
 pub(crate) mod quantise;
 pub(crate) mod tolerance;

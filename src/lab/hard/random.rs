@@ -16,7 +16,7 @@ use super::timing_of;
 
 impl Random {
     /// From `low` to `high`.
-    pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
+    pub(crate) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * ((self.next_u64() >> 40) as f32 / (1_u32 << 24) as f32)
     }
 
@@ -25,15 +25,15 @@ impl Random {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    pub(super) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
+    pub(crate) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[(self.next_u64() % choices.len() as u64) as usize]
     }
 
-    pub(super) fn chance(&mut self, share: f32) -> bool {
+    pub(crate) fn chance(&mut self, share: f32) -> bool {
         self.between(0.0, 1.0) < share
     }
 
-    fn direction(&mut self) -> Vec3 {
+    pub(crate) fn direction(&mut self) -> Vec3 {
         loop {
             let vector = Vec3::from_array([0; 3].map(|_| self.between(-1.0, 1.0)));
             if (0.01..1.0).contains(&vector.length_squared()) {
