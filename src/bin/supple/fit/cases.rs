@@ -40,7 +40,7 @@ pub(crate) struct Case {
 pub(crate) struct Cases<'a> {
     pub(crate) all: Vec<Case>,
     unknowns: &'a [Unknown],
-    done: HashMap<(usize, String), Vec<[f64; 3]>>,
+    done: HashMap<(usize, String, u64), Vec<[f64; 3]>>,
     /// The latest states at rest, from which the next ones begin.
     shapes: Vec<Option<Vec<[f32; 3]>>>,
     pub(crate) simulations: u32,
@@ -76,7 +76,7 @@ impl<'a> Cases<'a> {
     pub(crate) fn text(&self, case: &Case, values: &[f64]) -> Result<(String, Vec<Edit>), Problem> {
         let (mut text, mut all) = (case.file.text().to_owned(), vec![]);
         for (unknown, value) in self.unknowns.iter().zip(values) {
-            if unknown.scene.as_ref().is_some_and(|scene| *scene != case.scene) {
+            if !case.has(unknown) || unknown.place.is_clock() {
                 continue;
             }
             let problem = |message| Problem(format!("{}: {message} (scene {})", unknown.at, case.name));
@@ -92,14 +92,16 @@ impl<'a> Cases<'a> {
     pub(crate) fn displacements(&mut self, index: usize, values: &[f64]) -> Result<Vec<[f64; 3]>, Problem> {
         let case = &self.all[index];
         let (text, _) = self.text(case, values)?;
-        let key = (index, text);
+        let mut of_clock = self.unknowns.iter().zip(values).filter(|(unknown, _)| unknown.place.is_clock());
+        let clock = of_clock.find(|(unknown, _)| case.has(unknown)).map_or(0.0, |(_, value)| *value);
+        let key = (index, text, clock.to_bits());
         if let Some(done) = self.done.get(&key) {
             return Ok(done.clone());
         }
         self.simulations += 1;
         let setup = Setup::read(&SceneFile::of_text(case.file.path(), key.1.clone())?)?;
         let found = if case.samples.iter().any(|sample| sample.time.is_some()) {
-            case.over_time(&setup)?
+            case.over_time(&setup, clock)?
         } else {
             let from = self.shapes[index].as_deref();
             let shape = match at_rest(&setup, from, case.rest) {
@@ -172,10 +174,16 @@ impl Case {
         })
     }
 
-    /// Displacements of the samples at their times, from rest and by the method of the scene.
-    fn over_time(&self, setup: &Setup) -> Result<Vec<[f64; 3]>, Problem> {
+    /// Whether a value is one of this case.
+    fn has(&self, unknown: &Unknown) -> bool {
+        unknown.scene.as_ref().is_none_or(|scene| *scene == self.scene)
+    }
+
+    /// Displacements of the samples at their times, from rest and by the method of the scene, which starts at `clock` (s)
+    /// of these.
+    fn over_time(&self, setup: &Setup, clock: f64) -> Result<Vec<[f64; 3]>, Problem> {
         let Start { mut simulation, .. } = Start::new(setup, false)?;
-        let time = |index: usize| self.samples[index].time.unwrap_or_default();
+        let time = |index: usize| (self.samples[index].time.unwrap_or_default() - clock).max(0.0);
         let mut order: Vec<usize> = (0..self.samples.len()).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
         let mut found = vec![[0.0; 3]; self.samples.len()];

@@ -112,6 +112,9 @@ impl FitFile {
         if !(least <= first && first <= most) {
             return Err(self.problem(start, format!("start is {first}, it must be from min, {least}, to max, {most}")));
         }
+        if place.is_clock() && scene.is_none() {
+            return Err(self.problem(name, "clock is that of one scene; name it with scene ="));
+        }
         let scene = scene.as_ref().map(|scene| {
             let known = self.cases.iter().any(|case| case.scene.get_ref() == scene.get_ref());
             let message = || format!("no [[case]] has the scene {}", scene.get_ref().display());

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | of a number | the number, in the unit of the scene file |
 //! | of three numbers, as `gravity` or `force[0].newton` | a factor on them |
+//! | `clock` | no value: when the scene starts, s on the clock of what was measured |
 //! | `young`, `poisson` in `material` or a `region` | Young's modulus (Pa) or Poisson's ratio at rest, by the law's constants |
 //!
 //! Young's modulus changes all constants in Pa in proportion, Poisson's ratio `d`, which is half the bulk modulus in
@@ -61,6 +62,11 @@ impl Place {
 
     pub(crate) fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether it is no value of the scene, but the time on the clock of what was measured at which the scene starts, s.
+    pub(crate) fn is_clock(&self) -> bool {
+        self.name == "clock"
     }
 
     /// The last key.

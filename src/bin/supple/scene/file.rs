@@ -32,6 +32,8 @@ pub(crate) struct SceneTable {
     pub(crate) fix: Vec<Spanned<FixTable>>,
     #[serde(default)]
     pub(crate) force: Vec<Spanned<ForceTable>>,
+    #[serde(default)]
+    pub(crate) mass: Vec<Spanned<MassTable>>,
     #[serde(default, rename = "move")]
     pub(crate) motion: Vec<Spanned<MoveTable>>,
     #[serde(default)]
@@ -122,6 +124,7 @@ macro_rules! entry {
 
 entry!(FixTable { axes: Option<Spanned<String>> });
 entry!(ForceTable { newton: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
+entry!(MassTable { kilogram: Spanned<f32> });
 entry!(MoveTable { metre: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>>, axes: Option<Spanned<String>> });
 entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 entry!(SpringTable { stiffness: Option<Spanned<f32>>, per_area: Option<Spanned<f32>> });
@@ -203,11 +206,12 @@ impl SceneFile {
         let scene = &self.scene;
         let fix = scene.fix.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let force = scene.force.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let mass = scene.mass.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let motion = scene.motion.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let traction = scene.traction.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let pressure = scene.pressure.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
-        let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
+        let given = scene.gravity.iter().chain(fix).chain(force).chain(mass).chain(motion).chain(traction);
         let pull = scene.pull.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let point = scene.point.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let spring = scene.spring.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());

@@ -61,6 +61,22 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
     Ok((supports, forces, motions, pressures))
 }
 
+/// Point masses (kg) with their nodes.
+pub(crate) fn read_masses(file: &SceneFile, body: &Body) -> Result<Vec<(u32, f32)>, Problem> {
+    let mut masses = vec![];
+    for at in &file.scene.mass {
+        let kilogram = *at.get_ref().kilogram.get_ref();
+        if !(kilogram.is_finite() && kilogram > 0.0) {
+            let message =
+                format!("kilogram is {kilogram}, it must be a positive number; each selected node has so much");
+            return Err(file.problem(&at.get_ref().kilogram, message));
+        }
+        let nodes = select(file, at, &at.get_ref().selection(), body)?;
+        masses.extend(nodes.into_iter().map(|node| (node, kilogram)));
+    }
+    Ok(masses)
+}
+
 /// The triangles of the boundary with all three nodes selected.
 fn select_triangles<T>(
     file: &SceneFile,

@@ -13,7 +13,7 @@ use super::body::{Body, read_body};
 use super::file::SceneFile;
 use super::instruments::SceneInstruments;
 use super::learned::LearnedChoice;
-use super::loads::read_loads;
+use super::loads::{read_loads, read_masses};
 use super::plausible;
 use super::points::ScenePoints;
 use super::pulls::ScenePulls;
@@ -28,6 +28,8 @@ pub struct Setup {
     pub tissues: Tissues,
     pub element: Element,
     pub supports: Vec<Support>,
+    /// Point masses with their nodes, kg.
+    pub(crate) masses: Vec<(u32, f32)>,
     pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
     pub(crate) pressures: VecPressure,
@@ -64,6 +66,7 @@ impl Setup {
             None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
         };
         let (supports, forces, motions, pressures) = read_loads(file, &body)?;
+        let masses = read_masses(file, &body)?;
         let instruments = SceneInstruments::read(file, &body)?;
         let pulls = ScenePulls::read(file, &body)?;
         let points = ScenePoints::read(file, &body)?;
@@ -87,6 +90,7 @@ impl Setup {
             tissues,
             element,
             supports,
+            masses,
             forces,
             motions,
             pressures,
@@ -108,6 +112,7 @@ impl Setup {
             tissues: Tissues::one(Tissue { law: law.into(), density }),
             element: Element::Linear,
             supports: vec![],
+            masses: vec![],
             forces: vec![],
             motions: vec![],
             pressures: VecPressure::default(),
@@ -140,10 +145,15 @@ impl Setup {
 
     fn scene(&self) -> Result<VecScene<VecMaterial>, Problem> {
         let mesh = self.body.checked()?;
-        VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(|error| match error {
+        let scene = VecScene::build(self.tissues.material(self.element), &mesh, &self.supports);
+        let mut scene = scene.map_err(|error| match error {
             BuildError::Mesh(error) => self.body.mesh_problem(error),
             error => Problem(format!("{}: {error}", self.body.name)),
-        })
+        })?;
+        for &(node, kilogram) in &self.masses {
+            scene.add_mass(node as usize, kilogram);
+        }
+        Ok(scene)
     }
 
     /// A simulation at rest.
