@@ -123,8 +123,10 @@ pub(crate) struct Series<'a> {
 /// Tissue that relaxes: [`Series`] with the memory of its elements.
 pub(crate) struct Relaxing<'a> {
     series: Series<'a>,
-    /// Of a term, if all elements are of one tissue: `g`, and `1 - e^(-h / tau)` of the first half and of both.
-    alike: Option<[[f32; 3]; MOST_TERMS]>,
+    /// Whether all elements are of one tissue.
+    alike: bool,
+    /// Of the first tissues.
+    listed: [OfTissue; MOST_LISTED],
     /// A part of about a unit in the last place, over the number itself.
     part: f32,
     /// Where the table of tiles begins in memory.
@@ -150,62 +152,94 @@ impl<'a> Relaxing<'a> {
         let evenly = |by: u64| (series.step.wrapping_mul(by) >> 40) as f32 / (1_u32 << 24) as f32 - 0.5;
         // The sum of two has no mean error where a unit is not what it is taken for, as one alone has.
         let part = f32::EPSILON * (evenly(SPREAD[0]) + evenly(SPREAD[1]));
-        let alike = match series.tissues {
-            [tissue] if series.of_element.is_empty() => Some(core::array::from_fn(|term| {
-                let [first, both] = series.spans().map(|span| -libm::expm1f(-span * tissue.rate(term)));
-                [tissue.share(term), first, both]
-            })),
-            _ => None,
-        };
+        let mut listed = [OfTissue::NONE; MOST_LISTED];
+        for (of, tissue) in listed.iter_mut().zip(series.tissues) {
+            *of = OfTissue::new(tissue, series.halves);
+        }
+        let alike = series.of_element.is_empty();
         let (before, after): (&[f32], &mut [f32]) = (must_cast_slice(before), bytemuck::must_cast_slice_mut(after));
         let (before, after) = (before.as_chunks().0, after.as_chunks_mut().0);
-        Self { series, alike, part, table: table.as_ptr().addr(), before, after, own }
+        Self { series, alike, listed, part, table: table.as_ptr().addr(), before, after, own }
     }
 
-    /// `g`, and `1 - e^(-h / tau)` of the first half and of both, of a term of a vector of elements.
+    /// The tissues of a vector of elements.
     #[inline(always)]
-    fn of_term<R: Real>(&self, term: usize, element: &impl Fn(usize) -> usize) -> [R; 3] {
-        if let Some(alike) = &self.alike {
-            return alike[term % MOST_TERMS].map(R::splat);
+    fn tissues<R: Real>(&self, element: impl Fn(usize) -> usize) -> [usize; TILE] {
+        let mut tissues = [0; TILE];
+        if !self.alike {
+            for (lane, tissue) in tissues.iter_mut().enumerate().take(R::COUNT) {
+                *tissue = self.series.tissue(element(lane));
+            }
         }
-        let share = R::from_fn(|lane| self.series.of(element(lane)).share(term));
-        let rate = R::from_fn(|lane| self.series.of(element(lane)).rate(term));
-        let [first, both] = self.series.spans().map(|span| relaxed_part(rate * R::splat(span)));
-        [share, first, both]
+        tissues
     }
+
+    /// A number of each of these tissues.
+    #[inline(always)]
+    fn gathered<R: Real>(&self, tissues: &[usize; TILE], number: impl Fn(&OfTissue) -> f32) -> R {
+        if self.alike {
+            return R::splat(number(&self.listed[0]));
+        }
+        R::from_fn(|lane| match self.listed.get(tissues[lane % TILE]) {
+            Some(of) => number(of),
+            None => number(&self.not_listed(tissues[lane % TILE])),
+        })
+    }
+
+    #[cold]
+    fn not_listed(&self, tissue: usize) -> OfTissue {
+        let series = self.series.tissues.get(tissue).copied().unwrap_or(Prony::NONE);
+        OfTissue::new(&series, self.series.halves)
+    }
+}
+
+/// Tissues whose numbers are computed once for all elements, not for each.
+const MOST_LISTED: usize = 32;
+
+/// What a step needs of a tissue.
+#[derive(Clone, Copy)]
+struct OfTissue {
+    /// Of each term `g`, and `1 - e^(-h / tau)` of the first half and of both.
+    terms: [[f32; 3]; MOST_TERMS],
+    /// The share of the stabilising modulus that stays.
+    stabilising: f32,
+}
+
+impl OfTissue {
+    const NONE: Self = Self { terms: [[0.0; 3]; MOST_TERMS], stabilising: 1.0 };
+
+    fn new(series: &Prony, [first, second]: [f32; 2]) -> Self {
+        // Finite, so that a rate of zero makes no NaN of it.
+        let spans = [first, first + second].map(|span| span.min(f32::MAX));
+        let of_term = |term: usize| {
+            let [at_step, over_step] = spans.map(|span| -libm::expm1f(-span * series.rate(term)));
+            [series.share(term), at_step, over_step]
+        };
+        Self { terms: core::array::from_fn(of_term), stabilising: stabilising_share(series) }
+    }
+}
+
+/// The share of the stabilising modulus of nodal strain that stays.
+fn stabilising_share(series: &Prony) -> f32 {
+    (1.0 - series.relaxed()).max(LEAST_STABILISING)
 }
 
 impl Series<'_> {
-    /// The share of the stabilising modulus of mesh element `element` that stays.
-    pub(super) fn stabilising(&self, element: usize) -> f32 {
-        (1.0 - self.of(element).relaxed()).max(LEAST_STABILISING)
+    /// The tissue of mesh element `element`.
+    #[inline(always)]
+    fn tissue(&self, element: usize) -> usize {
+        self.of_element.get(element).copied().unwrap_or_default().into()
     }
 
     /// That of mesh element `element`.
-    #[inline(always)]
     pub(super) fn of(&self, element: usize) -> Prony {
-        let tissue = self.of_element.get(element).copied().unwrap_or_default();
-        self.tissues.get(usize::from(tissue)).copied().unwrap_or(Prony::NONE)
+        self.tissues.get(self.tissue(element)).copied().unwrap_or(Prony::NONE)
     }
 
-    /// `h` and `h + h'`, s; finite, so that a rate of zero makes no NaN of it.
-    fn spans(&self) -> [f32; 2] {
-        let [first, second] = self.halves;
-        [first, first + second].map(|span| span.min(f32::MAX))
+    /// See [`stabilising_share`].
+    pub(super) fn stabilising(&self, element: usize) -> f32 {
+        stabilising_share(&self.of(element))
     }
-}
-
-/// `1 - e^(-x)` for `x` from zero on, to within a few units in the last place.
-#[inline(always)]
-fn relaxed_part<R: Real>(x: R) -> R {
-    /// Below, the series.
-    const SMALL: f32 = 0.1;
-    let c = R::splat;
-    let sum = x.fused(c(-1.0 / 120.0), c(1.0 / 24.0));
-    let sum = x.fused(-sum, c(1.0 / 6.0));
-    let sum = x.fused(-sum, c(0.5));
-    let series = x * x.fused(-sum, c(1.0));
-    (c(SMALL) - x).choose(series, c(1.0) - (-x).exp())
 }
 
 /// The place of an item in the table that begins at address `table`.
@@ -255,8 +289,10 @@ impl Relaxing<'_> {
         let tile = place_of(self.table, tile);
         let (part, terms) = (R::splat(self.part), self.series.terms.min(MOST_TERMS));
         let mut sum = [R::splat(0.0); COMPONENTS];
+        let tissues = self.tissues::<R>(element);
         for term in 0..terms {
-            let [share, at_step, over_step] = self.of_term::<R>(term, &element);
+            let [share, at_step, over_step] =
+                [0, 1, 2].map(|number| self.gathered::<R>(&tissues, |of| of.terms[term % MOST_TERMS][number]));
             let driving = share * scale;
             let rows = COMPONENTS * (terms * tile + term);
             let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
@@ -302,12 +338,7 @@ impl Past for Relaxing<'_> {
     /// is never negative.
     #[inline(always)]
     fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
-        let mut left = R::splat(1.0);
-        for term in 0..self.series.terms.min(MOST_TERMS) {
-            let [share, ..] = self.of_term::<R>(term, &element);
-            left = left - share;
-        }
-        modulus * left.max(R::splat(LEAST_STABILISING))
+        modulus * self.gathered::<R>(&self.tissues::<R>(element), |of| of.stabilising)
     }
 
     /// With `q = -J^(-2/3) sum_i Q_i` the stress is `p1 (F - N) + (s - C:q / (3 J)) N + F q`. Every product below is small
