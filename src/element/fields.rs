@@ -17,7 +17,8 @@ pub struct ElementFields {
     pub element: usize,
     /// Volume over volume at rest, `J`.
     pub volume_ratio: f64,
-    /// Von Mises stress of the Cauchy stress `P F^T / J`, Pa; NaN for an element without positive volume.
+    /// Von Mises stress of the Cauchy stress `P F^T / J`, Pa; NaN for an element without positive volume. That of the law:
+    /// tissue that relaxes has less.
     pub von_mises: f64,
 }
 

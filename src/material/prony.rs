@@ -79,6 +79,18 @@ impl fmt::Display for PronyError {
 
 impl core::error::Error for PronyError {}
 
+/// Shares and times, for people.
+impl fmt::Display for Prony {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let terms = self.shares.iter().zip(&self.rates).take(self.terms());
+        for (term, (share, rate)) in terms.enumerate() {
+            let comma = if term > 0 { ", " } else { "" };
+            write!(f, "{comma}{:.1} % in {:.3e} s", 100.0 * share, 1.0 / rate)?;
+        }
+        Ok(())
+    }
+}
+
 impl Prony {
     /// Nothing relaxes.
     pub const NONE: Self = Self { shares: [0.0; MOST_TERMS], rates: [0.0; MOST_TERMS] };

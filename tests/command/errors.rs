@@ -36,6 +36,16 @@ fn bad_scenes_are_refused_in_words() {
         (instead("density = 1000.0", "density = nan"), "line 10: density is NaN"),
         (instead("density = 1000.0", "density = [1]"), "line 10: invalid type: sequence, expected f32"),
         (instead("density = 1000.0", ""), "line 6: missing field `density`"),
+        (
+            instead("density = 1000.0", "density = 1000.0\nprony = [[0.2, 0.1], [0.9, 1.0]]"),
+            "line 11: the shares of the relaxation add up to 1.1",
+        ),
+        (
+            instead("density = 1000.0", "density = 1000.0\nprony = [[0.2, 0.0]]"),
+            "line 11: term 0 of the relaxation has the time 0 s",
+        ),
+        (instead("density = 1000.0", "density = 1000.0\nprony = [0.2, 0.1]"), "line 11: invalid type"),
+        (with("[[mass]]\nnodes = [50]\nkilogram = 0.0\n"), "line 15: kilogram is 0, it must be a positive number"),
         (with("[[fix]]\nplane = { axis = \"w\", at = 0.0 }\n"), "unknown variant `w`"),
         (
             with("[[fix]]\nplane = { axis = \"x\", at = 0.5 }\n"),

@@ -112,6 +112,40 @@ fn damping_comes_back_from_displacements_over_time() {
     }
 }
 
+/// Share and time of relaxation, and when the film starts: 12 ms late.
+#[test]
+fn relaxation_comes_back_from_displacements_over_time() {
+    let desk = Desk::new();
+    let model = |terms: &str| {
+        let weight = "[[mass]]\nbox = { min = [0.0, 0.0, 0.05], max = [0.02, 0.02, 0.05] }\nkilogram = 0.0005\n";
+        scene([2, 2, 5], weight).replace("density", &format!("prony = {terms}\ndensity"))
+    };
+    let mut all = String::new();
+    for time in [0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6] {
+        let scene = model("[[0.3, 0.15]]").replace("end = 1.0", &format!("end = {time}"));
+        let text = measured(&desk, &scene, 0.02e-3, &format!("{}", time + 0.012));
+        all += if all.is_empty() { &text } else { text.split_once('\n').unwrap().1 };
+    }
+    desk.write("points.csv", &all);
+    desk.write("model.toml", &model("[[0.15, 0.3]]"));
+    let parameter = |name: &str, start: f64, most: f64| {
+        format!("[[parameter]]\nname = \"{name}\"\nstart = {start:?}\nmin = 0.001\nmax = {most:?}\n")
+    };
+    let clock = parameter("clock", 0.005, 0.05) + "scene = \"model.toml\"\n";
+    let terms = parameter("material.prony[0][0]", 0.15, 0.9) + &parameter("material.prony[0][1]", 0.3, 2.0);
+    let said = fit(&desk, &format!("{terms}{clock}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    println!("{}", said.out);
+    let result = result(&desk);
+    for (index, truth) in [0.3, 0.15, 0.012].into_iter().enumerate() {
+        let parameter = &result["parameters"][index];
+        let (value, error) = (parameter["value"].as_f64().unwrap(), parameter["standard_error"].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.15 * truth, "{value} +- {error} of {truth}");
+    }
+    let said = fit(&desk, &format!("{}{}", parameter("clock", 0.005, 0.05), case("")));
+    assert!(said.code == 2 && said.err.contains("clock is that of one scene"), "{}", said.err);
+}
+
 #[test]
 fn what_the_data_cannot_tell_is_told() {
     let desk = Desk::new();

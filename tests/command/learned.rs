@@ -52,6 +52,15 @@ fn far(desk: &Desk) -> f64 {
 }
 
 #[test]
+fn tissue_that_relaxes_is_refused() {
+    let desk = Desk::new();
+    desk.network("a.weights", &stopping());
+    let scene = leaning("end = 0.6\n", "").replace("density", "prony = [[0.2, 0.1]]\ndensity");
+    let said = desk.simulate(&scene, &[]);
+    assert!(said.code == 2 && said.err.contains("learned steps do not know tissue that relaxes"), "{}", said.err);
+}
+
+#[test]
 fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
     let desk = Desk::new();
     desk.network("a.weights", &stopping());

@@ -44,7 +44,7 @@ impl Folder {
     }
 
     /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio
-    /// J of the elements.
+    /// J of the elements. The stress is that of the law, so not of tissue that relaxes.
     pub(crate) fn add_frame(
         &mut self,
         setup: &Setup,
@@ -63,6 +63,7 @@ impl Folder {
             von_mises[fields.element] = fields.von_mises as f32;
             volume_ratio[fields.element] = fields.volume_ratio as f32;
         }
+        let cells = [("von_mises", &von_mises[..]), ("volume_ratio", &volume_ratio[..])];
         let number = self.count;
         self.count += 1;
         let name = format!("frame_{number:04}.vtu");
@@ -71,7 +72,7 @@ impl Folder {
             tets: &body.mesh.tets,
             point_vectors: &[("displacement", &displacement), ("velocity", &velocity)],
             point_scalars: &[("pressure", &pressure)],
-            cell_scalars: &[("von_mises", &von_mises), ("volume_ratio", &volume_ratio)],
+            cell_scalars: if setup.tissues.relax() { &cells[1..] } else { &cells },
         };
         write_vtu(&self.path(&name), &frame).map_err(Problem::of)?;
         self.frames.push((state.time(), name));

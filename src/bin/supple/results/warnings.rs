@@ -11,6 +11,9 @@ const OUTSIDE: f64 = 0.01;
 /// Of the scene, then of what became of it.
 pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     let mut warnings = setup.warnings.clone();
+    if setup.tissues.relax() {
+        warnings.push("the frames have no von Mises stress: it is not known of tissue that relaxes".into());
+    }
     if let Some(settled) = outcome.settled.filter(|settled| !settled.at_rest) {
         warnings.push(format!(
             "the body is not at rest after {} steps, {:.2e} m to go; a body that no support holds never is",

@@ -107,6 +107,9 @@ impl fmt::Display for Tissues {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Tissue { law, density } = &self.tissues[0];
         write!(f, "{law}, {density} kg/m^3")?;
+        if self.prony[0] != Prony::NONE {
+            write!(f, ", relaxes: {}", self.prony[0])?;
+        }
         match self.tissues.len() - 1 {
             0 => Ok(()),
             1 => write!(f, ", 1 further region"),
