@@ -23,6 +23,7 @@
 //! | [`cost`] | what a simulated second takes, by size of mesh |
 //! | [`pulls`] | a lobe on pulls: tracked points, random ones, what they cost |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
+//! | [`large_strain`] | elements at strains beyond a half |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | `training` (feature `train`) | scenes to learn from; the search for a damper |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
@@ -34,6 +35,7 @@ mod error;
 pub mod evaluate;
 pub mod hard;
 pub mod implicit;
+pub mod large_strain;
 pub mod literal;
 pub mod measure;
 pub mod method;

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use supple_cli::screen;
 
-use command::{cost, hard, methods, physics, pulls, tolerance};
+use command::{cost, hard, large_strain, methods, physics, pulls, tolerance};
 #[cfg(feature = "train")]
 use command::{quantise, train};
 
@@ -35,6 +35,8 @@ enum Command {
     Hard(hard::Asked),
     /// Adaptive steps over the hard cases, against fixed steps: tolerance.csv
     Tolerance(tolerance::Asked),
+    /// Elements at strains beyond a half, against nodal pressure on fine meshes: large-strain.csv
+    LargeStrain(large_strain::Asked),
     /// What a simulated second takes, by size of mesh and method: cost.csv
     Cost(cost::Asked),
     /// A lobe on pulls: errors and times of tracked points, what pulls cost, whether any run goes wrong
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
         Command::Physics(asked) => physics::judge(&asked),
         Command::Hard(asked) => hard::judge(&asked),
         Command::Tolerance(asked) => tolerance::judge(&asked),
+        Command::LargeStrain(asked) => large_strain::judge(&asked),
         Command::Cost(asked) => cost::judge(&asked),
         Command::Pulls(asked) => pulls::judge(&asked),
         #[cfg(feature = "train")]

@@ -76,6 +76,7 @@ damping = 20.0
 shape = "bar"
 size = [0.02, 0.02, 0.1]
 cells = [2, 2, 10]
+element = "nodal-pressure"
 [material]
 law = "neo-hookean"
 c = 500.0

@@ -156,7 +156,7 @@ fn what_does_not_go_together_is_refused_in_words() {
         ("end = 1.0\nstep = \"x\"\n", "line 16: step \"x\" is not known; give seconds, \"auto\", or a multiple"),
         ("end = 1.0\nstep = \"-20x\"\n", "line 16: step is \"-20x\", it must be a positive multiple"),
         ("end = 1.0\nstep = \"nanx\"\n", "line 16: step is \"nanx\""),
-        ("end = 0.1\nstep = \"5000x\"\nmethod = \"long\"\n", "line 16: the step of 2.9"),
+        ("end = 0.1\nstep = \"5000x\"\nmethod = \"long\"\n", "line 16: the step of 3.2"),
         (
             "step = 0.001\nend = 1.0\nlattice = [2, 2, 4]\n",
             "line 17: lattice is [2, 2, 4], but method \"exact\" has none; \"long\" and \"auto\" have",

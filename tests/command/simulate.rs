@@ -17,6 +17,7 @@ damping = 10.0
 shape = "bar"
 size = [0.02, 0.02, 0.05]
 cells = [2, 2, 5]
+element = "nodal-pressure"
 [material]
 law = "neo-hookean"
 c = 500.0

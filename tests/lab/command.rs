@@ -47,6 +47,17 @@ fn a_mesh_that_cannot_be_judged_is_named() {
 }
 
 #[test]
+fn cells_that_do_not_fit_the_patch_are_refused() {
+    let (folder, path) = folder();
+    for cells in [["7", "6"], ["6", "12"], ["6", "0"]] {
+        let (code, _, err) = lab(&folder, &["large-strain", "--quick", "--truth", cells[0], cells[1], "--out", "out"]);
+        assert_eq!(code, Some(2));
+        assert!(err.starts_with("error: --truth: they must be multiples of six, the larger one first"), "{err}");
+        assert!(!path("out").exists());
+    }
+}
+
+#[test]
 fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
     let (folder, path) = folder();
     let (code, out, err) = lab(&folder, &["physics", "--scene", "torsion", "--out", "out"]);

@@ -5,6 +5,7 @@ mod command;
 mod damper;
 mod evaluate;
 mod hard;
+mod large_strain;
 #[cfg(feature = "slow-tests")]
 mod moving;
 #[cfg(feature = "slow-tests")]

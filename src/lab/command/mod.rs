@@ -4,6 +4,7 @@ pub(crate) mod cost;
 #[cfg(feature = "train")]
 mod exemplar;
 pub(crate) mod hard;
+pub(crate) mod large_strain;
 pub(crate) mod methods;
 pub(crate) mod physics;
 pub(crate) mod pulls;

@@ -231,11 +231,11 @@ fn locking(place: &str, network: Option<&LearnedChoice>, element: Element, tissu
     ))
 }
 
-/// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that do not
-/// lock.
+/// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that are
+/// right more often, also at large strain (docs/accuracy.md, "Strain beyond a half").
 fn read_element(file: &SceneFile, learned: Option<&LearnedChoice>) -> Result<Element, Problem> {
     let Some(at) = &file.scene.mesh.get_ref().element else {
-        return learned.map_or(Ok(Element::NodalPressure), LearnedChoice::element);
+        return learned.map_or(Ok(Element::NodalStrain), LearnedChoice::element);
     };
     element_named(at.get_ref()).map_err(|message| file.problem(at, message))
 }
