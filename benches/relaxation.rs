@@ -1,4 +1,4 @@
-//! What tissue that relaxes costs on blocks under gravity: an exact step with one, two and three terms over the same
+//! What tissue that relaxes costs on bars under gravity: an exact step with one, two and three terms over the same
 //! without, with one term of two tissues, and a step of 20 times the critical one with one term; bytes an element and
 //! term. Medians of runs in turn.
 //!
@@ -30,14 +30,14 @@ struct Relaxing {
 }
 
 impl Relaxing {
-    /// A block of cells of 4 mm that is held at one end, of so many tissues with so many terms each.
+    /// A bar of cells of 4 mm that is held at one end, of so many tissues with so many terms each.
     fn new(cells: u32, material: &VecMaterial, [tissues, terms]: [usize; 2], multiple: f32) -> Self {
         let bar = Bar {
             size: [0.004 * cells as f32, 0.004 * cells as f32, 0.008 * cells as f32],
             cells: [cells, cells, 2 * cells],
         };
         let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
-        let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("a sound block");
+        let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("a sound bar");
         let series: Vec<_> = (0..terms).map(|term| [0.2, 0.01 * 10.0_f32.powi(term as i32)]).collect();
         let prony = if terms > 0 { vec![Prony::new(&series).expect("a series"); tissues] } else { vec![] };
         let of_element =
