@@ -8,11 +8,11 @@ use core::fmt;
 pub const MOST_TERMS: usize = 3;
 
 /// The most that may relax of the stress of distortion: something has to hold the tissue.
-const MOST_SHARE: f32 = 0.99;
+pub(crate) const MOST_SHARE: f32 = 0.99;
 /// The shortest time of relaxation, s.
-const SHORTEST: f32 = 1e-6;
+pub(crate) const SHORTEST: f32 = 1e-6;
 /// The longest, s.
-const LONGEST: f32 = 1e6;
+pub(crate) const LONGEST: f32 = 1e6;
 
 /// How a tissue relaxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,10 +62,16 @@ impl fmt::Display for PronyError {
                 write!(f, "term {term} of the relaxation has the share {value}: it must be a positive number")
             }
             Self::Seconds { term, value } => {
-                write!(f, "term {term} of the relaxation has the time {value} s: it must be from {SHORTEST} to {LONGEST} s")
+                write!(
+                    f,
+                    "term {term} of the relaxation has the time {value} s: it must be from {SHORTEST} to {LONGEST} s"
+                )
             }
             Self::Sum { value } => {
-                write!(f, "the shares of the relaxation add up to {value}: at most {MOST_SHARE} of the stress may relax")
+                write!(
+                    f,
+                    "the shares of the relaxation add up to {value}: at most {MOST_SHARE} of the stress may relax"
+                )
             }
         }
     }
