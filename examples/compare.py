@@ -39,7 +39,7 @@ class SceneConfig(Structure):
         *((name, c_uint32) for name in ("nodes", "elements", "supports", "tissues")),
         ("points", POINTER(c_float)), ("tetrahedra", POINTER(c_uint32)), ("support", POINTER(Support)),
         ("tissue", POINTER(Tissue)), ("tissue_of_element", POINTER(c_uint16)),
-        ("element", c_uint32), ("reserved", c_uint32), ("removed", POINTER(c_uint8)),
+        ("element", c_uint32), ("reserved", c_uint32), ("removed", POINTER(c_uint8)), ("prony", POINTER(c_float)),
     ]
 
 

@@ -40,13 +40,18 @@
 #define SUPPLE_POLYNOMIAL 2 /* c (Pa), e (Pa), d (Pa) */
 
 /* Sizes as constant expressions: what the functions give; with SUPPLE_NODAL_STRAIN a scene needs SUPPLE_SCENE_SIZE and
- * SUPPLE_PATCHES_SIZE together; of a supple_large, with x * y * z cells that you give, never less. */
+ * SUPPLE_PATCHES_SIZE together, with tissue that relaxes and SUPPLE_PRONY_SIZE, and its state SUPPLE_STATE_SIZE and
+ * SUPPLE_RELAXATION_SIZE; of a supple_large, with x * y * z cells that you give, never less. */
 #define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \
     1024 * SUPPLE_TILES_(elements) + SUPPLE_ARRAY_(tissues, 20) + SUPPLE_ARRAY_((tissues) > 1 ? (elements) : 0, 2))
 #define SUPPLE_PATCHES_SIZE(nodes, elements, tissues) ((size_t)320 * (9 + SUPPLE_GROUPS_(elements) *                             \
     (1 + SUPPLE_LEAST_((size_t)(nodes), 48)) + SUPPLE_PATCHES_(nodes, elements, tissues) / 16 +                                \
     (4 * (size_t)(elements) + 2 * SUPPLE_PATCHES_(nodes, elements, tissues) + 15) / 16 + (((size_t)(nodes) + 1) / 2 + 39) / 40 + \
     (2 * (size_t)(elements) + 39) / 40 + (SUPPLE_PATCHES_(nodes, elements, tissues) + 39) / 40))
+#define SUPPLE_PRONY_SIZE(tissues) SUPPLE_ARRAY_(tissues, 24)
+#define SUPPLE_RELAXATION_SIZE(nodes, elements, tissues, element, terms) ((size_t)768 * (terms) *                              \
+    ((element) == SUPPLE_NODAL_STRAIN ? SUPPLE_PATCHES_(nodes, elements, tissues) / 16 + SUPPLE_GROUPS_(elements)              \
+                                      : SUPPLE_TILES_(elements)))
 #define SUPPLE_STATE_SIZE(nodes, element) \
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
@@ -383,7 +388,8 @@ enum supple_status
      */
     SUPPLE_E_CHOICE = -7,
     /**
-     * Objects for scenes with other numbers of nodes (value, limit).
+     * Objects for scenes with other numbers of nodes (value, limit), or a saved state of tissue that remembers other
+     * bytes (value) than that of the state (limit).
      */
     SUPPLE_E_MISMATCH = -8,
     /**
@@ -495,6 +501,15 @@ enum supple_status
      */
     SUPPLE_E_NO_NODES = -37,
     /**
+     * Tissue `index` relaxes by a share (value; axis: which term) that is no positive number, or without an axis by more
+     * in sum than may relax (limit).
+     */
+    SUPPLE_E_RELAXATION_SHARE = -38,
+    /**
+     * Tissue `index` relaxes with a time (value, s; axis: which term) that is not from 1e-6 to 1e6 s (limit: which of them).
+     */
+    SUPPLE_E_RELAXATION_TIME = -39,
+    /**
      * Weights do not begin at a multiple of four bytes.
      */
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -596,6 +611,11 @@ enum supple_status
      * The step was not taken: learned steps do not know pulls.
      */
     SUPPLE_E_NO_PULLS = -96,
+    /**
+     * The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
+     * (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
+     */
+    SUPPLE_E_NO_RELAXATION = -97,
     /**
      * The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
      * around it (limit: its size, m).
@@ -710,6 +730,22 @@ typedef struct {
 } supple_tissue;
 
 /**
+ * How a tissue relaxes: a Prony series of at most three terms. Of the stress that changes the shape, term `i` relaxes the
+ * share `share[i]` with the time `seconds[i]`; pressure does not relax. The constants of the law are those of a motion
+ * that is over before anything relaxes.
+ */
+typedef struct {
+    /**
+     * Positive, at most 0.99 in sum; 0: no such term.
+     */
+    float share[3];
+    /**
+     * From 1e-6 to 1e6 s; ignored where the share is 0.
+     */
+    float seconds[3];
+} supple_prony;
+
+/**
  * What a scene is built from. Everything is copied; nothing needs to stay.
  */
 typedef struct {
@@ -778,6 +814,11 @@ typedef struct {
      * numbers; nodes without an element left are held where they are and weigh nothing.
      */
     const uint8_t *removed;
+    /**
+     * How each of the `tissues` relaxes; NULL: none does. Needs more memory: supple_prony_size, supple_relaxation_size.
+     * Only in a library with all laws.
+     */
+    const supple_prony *prony;
 } supple_scene_config;
 
 /**
@@ -797,7 +838,7 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * 0, 1, 2 for x, y, z.
+     * 0, 1, 2 for x, y, z; or of a tissue that relaxes for the terms of its series.
      */
     uint32_t axis;
     /**
@@ -1719,11 +1760,30 @@ const char *supple_status_text(int32_t status);
 
 /**
  * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
- * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
+ * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
  */
 size_t supple_scene_size(uint32_t nodes,
                          uint32_t elements,
                          uint32_t tissues);
+
+/**
+ * Bytes of memory that a scene with tissue that relaxes needs more than supple_scene_size. SUPPLE_PRONY_SIZE is the same
+ * as a constant.
+ */
+size_t supple_prony_size(uint32_t tissues);
+
+/**
+ * Bytes of memory that the state of a scene with tissue that relaxes needs more than supple_state_size, for what the
+ * tissue remembers. SUPPLE_RELAXATION_SIZE is the same as a constant.
+ *
+ * @param element SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
+ * @param terms of the tissue that has most: 1 to 3.
+ */
+size_t supple_relaxation_size(uint32_t nodes,
+                              uint32_t elements,
+                              uint32_t tissues,
+                              uint32_t element,
+                              uint32_t terms);
 
 /**
  * Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any
@@ -1736,11 +1796,11 @@ size_t supple_patches_size(uint32_t nodes,
                            uint32_t tissues);
 
 /**
- * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size,
- * aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is
- * told by supple_scene_describe; the rest is free for other use.
+ * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, with
+ * tissue that relaxes and supple_prony_size, aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning
+ * of that memory. What it takes of it is told by supple_scene_describe; the rest is free for other use.
  *
- * @param error may be NULL; index is that of an element, a support or a node as the status says.
+ * @param error may be NULL; index is that of an element, a support, a node or a tissue as the status says.
  */
 supple_status supple_scene_init(void *memory,
                                 size_t bytes,
@@ -1828,7 +1888,7 @@ supple_status supple_traction(const float *points,
 
 /**
  * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
- * the same as a constant.
+ * the same as a constant. With tissue that relaxes it needs supple_relaxation_size bytes more.
  *
  * @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
  */
@@ -1836,7 +1896,8 @@ size_t supple_state_size(uint32_t nodes,
                          uint32_t element);
 
 /**
- * Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.
+ * Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, with tissue that relaxes and
+ * supple_relaxation_size, aligned to SUPPLE_ALIGN.
  */
 supple_status supple_state_init(void *memory,
                                 size_t bytes,
@@ -1844,14 +1905,14 @@ supple_status supple_state_init(void *memory,
                                 supple_state **state);
 
 /**
- * Puts a state back to rest at time zero. Its step stays. The first step of a supple_large computes its inertia anew;
+ * Puts a state back to rest at time zero; tissue that relaxes remembers nothing. Its step stays. The first step of a supple_large computes its inertia anew;
  * a supple_learned needs supple_learned_reset and a new lead-in.
  */
 supple_status supple_state_reset(supple_state *state);
 
 /**
- * Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the
- * strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
+ * Stops all motion: nodes, time and what tissue remembers stay as they are, velocities are zero, and the energy balance
+ * begins with the strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
  * needs a new lead-in.
  */
 supple_status supple_state_stop(const supple_scene *scene,
@@ -2364,22 +2425,30 @@ supple_status supple_local_force_at(const supple_local_force *model,
                                     float *force);
 
 /**
- * Bytes that a saved state of so many nodes has.
+ * Bytes that a saved state of so many nodes has. With tissue that relaxes it has more: supple_state_saved_size.
  */
 size_t supple_saved_size(uint32_t nodes);
 
 /**
+ * Writes how many bytes a state has when it is saved.
+ */
+supple_status supple_state_saved_size(const supple_state *state, size_t *bytes);
+
+/**
  * Saves a state with its step to `to`, at any address.
  *
- * @param bytes room there: supple_saved_size at least.
+ * @param bytes room there: supple_state_saved_size at least, which is supple_saved_size where no tissue relaxes.
  */
-supple_status supple_save(const supple_state *state, void *to, size_t bytes);
+supple_status supple_save(const supple_state *state,
+                          void *to,
+                          size_t bytes);
 
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
  * saved one would have, to the bit; with nodal strain unless an element was crushed within the last 16 steps, which
  * the restored state may see some steps sooner. Forces are zero until the next step. A saved state with a time, a
- * displacement or an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE.
+ * displacement or an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. So
+ * is one of a scene whose tissue remembers more or less: SUPPLE_E_MISMATCH.
  * The first step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same
  * bits with these, copy their objects with memcpy as well.
  */
@@ -2643,8 +2712,8 @@ supple_status supple_default_settings(supple_settings *settings);
 /**
  * Writes how many bytes of memory are enough for a simulation. supple_sim_describe tells how many it takes.
  *
- * @param body what it will be built from; of it the numbers of nodes, elements and tissues and the element are looked
- * at.
+ * @param body what it will be built from; of it the numbers of nodes, elements and tissues, the element and how tissues
+ * relax are looked at.
  * @param error may be NULL.
  */
 supple_status supple_sim_size(const supple_scene_config *body,
@@ -2703,7 +2772,7 @@ size_t supple_settle_size(uint32_t nodes);
 /**
  * Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
  * Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
- * go to where they are asked for. Velocities are zero afterwards, and the energy balance begins with the strain energy.
+ * go to where they are asked for, and tissue that relaxes has had the time. Velocities are zero afterwards, and the energy balance begins with the strain energy.
  * Steps of every kind go on from there; a guard begins anew.
  *
  * SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
@@ -2745,8 +2814,8 @@ supple_status supple_sim_settle(supple_sim *sim,
 
 /**
  * Puts the nodes at displacements of yours, at a stop: velocities are zero, time stays, and the energy balance begins
- * with the strain energy. It counts as a step. Fixed nodes keep what is given, moved ones until a motion moves them. Of
- * a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
+ * with the strain energy. It counts as a step. What tissue that relaxes remembers stays. Fixed nodes keep what is given,
+ * moved ones until a motion moves them. Of a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
  *
  * @param displacements three components of each of `nodes` nodes, m, from rest.
  * @param nodes must be that of the scene.
@@ -2762,7 +2831,10 @@ supple_status supple_set_displacements(const supple_scene *scene,
  * Lets a state go on in a scene that has taken the place of another one of the same nodes and kind of element: without
  * some elements, with other tissues. Displacements, velocities and time stay, so what stays of the tissue keeps its
  * momentum; the energy balance begins anew. All that was prepared for the former scene, apart from loads and contact,
- * must be prepared again, and the step be set. It takes as long as an exact step or two.
+ * must be prepared again, and the step be set. It takes as long as an exact step or two. Tissue that relaxes goes on where
+ * all elements and patches are as before, in scenes with other constants, densities or supports; elsewhere it begins as if
+ * nothing had been deformed so far (supple_sim_carry_on does not). SUPPLE_E_NO_RELAXATION: the state has too little memory
+ * for what it must remember, as the former scene had fewer terms or tissues.
  */
 supple_status supple_state_carry_on(const supple_scene *scene,
                                     supple_state *state);
@@ -2800,7 +2872,7 @@ supple_status supple_sim_set_tissues(supple_sim *sim,
  * Lets a simulation that has just been set up go on where another one is, of a body of the same points: without some
  * elements (supple_scene_config.removed), with other tissues, another kind of element or other supports. It takes over
  * displacements, velocities, time, gravity, forces, motions, pressures, pulls, and where it has a surface the instruments with what
- * they hold; what stays of the tissue keeps its momentum, and the energy balance begins anew. Nodes that belong to no
+ * they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. Nodes that belong to no
  * element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
  * is left as it is, may go on, and its memory be used for the next exchange. supple_sim_setup, which takes longest, may
  * run on another thread while the other simulation goes on. This takes as long as supple_sim_set.

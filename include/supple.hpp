@@ -25,6 +25,8 @@ inline constexpr std::size_t align = SUPPLE_ALIGN;
 
 using support = supple_support;
 using tissue = supple_tissue;
+// How a tissue relaxes.
+using prony = supple_prony;
 using force = supple_force;
 using motion = supple_motion;
 using threads = supple_threads;
@@ -101,6 +103,8 @@ enum class [[nodiscard]] status : std::int32_t {
     e_field = SUPPLE_E_FIELD,
     e_pull = SUPPLE_E_PULL,
     e_no_nodes = SUPPLE_E_NO_NODES,
+    e_relaxation_share = SUPPLE_E_RELAXATION_SHARE,
+    e_relaxation_time = SUPPLE_E_RELAXATION_TIME,
 
     e_weights_misaligned = SUPPLE_E_WEIGHTS_MISALIGNED,
     e_weights_short = SUPPLE_E_WEIGHTS_SHORT,
@@ -132,6 +136,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_instrument = SUPPLE_E_DIVERGED_INSTRUMENT,
     e_no_contact = SUPPLE_E_NO_CONTACT,
     e_no_pulls = SUPPLE_E_NO_PULLS,
+    e_no_relaxation = SUPPLE_E_NO_RELAXATION,
     e_diverged_pressure = SUPPLE_E_DIVERGED_PRESSURE,
 };
 
@@ -257,7 +262,8 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_grid): case of(s::e_diverged):
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
     case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
-    case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): case of(s::e_diverged_pressure): return true;
+    case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): case of(s::e_diverged_pressure):
+    case of(s::e_relaxation_share): case of(s::e_relaxation_time): case of(s::e_no_relaxation): return true;
     }
     return false;
 }
@@ -308,6 +314,9 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_field: return {"instrument", "", false, false};
     case status::e_pull: return {"pull", "", true, false};
     case status::e_no_nodes: return {"pull", " m", true, true};
+    case status::e_relaxation_share: return {"tissue", "", true, true};
+    case status::e_relaxation_time: return {"tissue", " s", true, true};
+    case status::e_no_relaxation: return {"entry", " bytes", true, true};
     case status::e_grid: return {"entry", "", true, false};
     default: return {"entry", "", false, false};
     }
@@ -346,7 +355,10 @@ template <class T> struct [[nodiscard]] result {
     add(std::snprintf(at(), left(), "%s", text(code)));
     if (what.index != none) separate(), add(std::snprintf(at(), left(), "%s %lu", means.index, 0ul + what.index));
     if (what.node != none) separate(), add(std::snprintf(at(), left(), "node %lu", 0ul + what.node));
-    if (what.axis < 3) separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
+    if (what.axis < 3 && (code == status::e_relaxation_share || code == status::e_relaxation_time))
+        separate(), add(std::snprintf(at(), left(), "term %lu", 0ul + what.axis));
+    else if (what.axis < 3)
+        separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
     const bool is_nan = what.value != what.value;
     if (means.has_value && (!is_nan || code == status::e_not_finite))
         separate(), add(std::snprintf(at(), left(), "%.6g%s", what.value, means.unit));
@@ -380,6 +392,7 @@ struct body {
     span<const tissue> tissues;
     span<const std::uint16_t> tissue_of_element; // with one tissue: empty
     span<const std::uint8_t> removed;            // for each element 1 if it is removed; empty: none is
+    span<const supple::prony> prony;             // how each tissue relaxes; empty: none does
 };
 
 namespace detail {
@@ -400,7 +413,10 @@ template <class T> bool config_of(const body &from, supple_scene_config &config,
     if (from.tissues.size() > 1 && from.tissue_of_element.size() < elements)
         return refuse(status::e_short, from.tissue_of_element.size(), elements);
     if (from.removed.size() > 0 && from.removed.size() < elements) return refuse(status::e_short, from.removed.size(), elements);
+    if (from.prony.size() > 0 && from.prony.size() < from.tissues.size())
+        return refuse(status::e_short, from.prony.size(), from.tissues.size());
     config = detail::config<supple_scene_config>();
+    config.prony = from.prony.size() > 0 ? from.prony.data() : nullptr;
     config.removed = from.removed.size() > 0 ? from.removed.data() : nullptr;
     config.law = static_cast<std::uint32_t>(from.law);
     config.winding = static_cast<std::uint32_t>(from.winding);
@@ -428,8 +444,8 @@ public:
 
     // Bytes of memory that are enough to build one; what it then takes of them is in its facts.
     [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, std::uint32_t elements, std::uint32_t tissues = 1,
-                                                    element of = element::nodal_pressure) noexcept {
-        return SUPPLE_SCENE_SIZE(nodes, elements, tissues) +
+                                                    element of = element::nodal_pressure, bool relaxes = false) noexcept {
+        return SUPPLE_SCENE_SIZE(nodes, elements, tissues) + (relaxes ? SUPPLE_PRONY_SIZE(tissues) : 0) +
                (of == element::nodal_strain ? SUPPLE_PATCHES_SIZE(nodes, elements, tissues) : 0);
     }
 
@@ -563,6 +579,11 @@ public:
                                                     element of = element::nodal_pressure) noexcept {
         return SUPPLE_STATE_SIZE(nodes, static_cast<std::uint32_t>(of));
     }
+    // Bytes that it needs more for what tissue that relaxes remembers; `terms` of the tissue that has most.
+    [[nodiscard]] static constexpr std::size_t relaxation_size(std::uint32_t nodes, std::uint32_t elements, std::uint32_t tissues,
+                                                               element of, std::uint32_t terms) noexcept {
+        return SUPPLE_RELAXATION_SIZE(nodes, elements, tissues, static_cast<std::uint32_t>(of), terms);
+    }
 
     // Prepares one, at rest, in memory of at least `size` bytes.
     static result<state> make(memory place, scene of) noexcept {
@@ -655,8 +676,15 @@ public:
         return detail::of(supple_copy_forces(raw_, out.data(), out.size()));
     }
 
-    // Bytes that a saved state has.
+    // Bytes that a saved state has where no tissue relaxes.
     [[nodiscard]] static std::size_t saved_size(std::uint32_t nodes) noexcept { return supple_saved_size(nodes); }
+    // Bytes that this one has.
+    [[nodiscard]] result<std::size_t> saved_size() const noexcept {
+        result<std::size_t> bytes{};
+        bytes.status = detail::of(supple_state_saved_size(raw_, &bytes.value));
+        bytes.error = detail::nothing(bytes.status);
+        return bytes;
+    }
 
     // Saves the state with its step, to any address.
     status save(memory to) const noexcept { return detail::of(supple_save(raw_, to.data(), to.size())); }

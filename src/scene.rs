@@ -13,7 +13,8 @@ use core::ops::{Deref, Range};
 
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
-    Remembered, Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
+    Remembered, Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, patch_tiles_for,
+    stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli, Prony};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -58,6 +59,23 @@ impl Support {
 #[must_use]
 pub const fn tiles_for(elements: usize) -> usize {
     most_tiles(elements)
+}
+
+/// No fewer than [`SceneView::memory_vectors`] of any scene of so many nodes, elements and tissues, none of which
+/// relaxes with more `terms`.
+#[must_use]
+pub const fn memory_vectors_for(
+    element: Element,
+    nodes: usize,
+    elements: usize,
+    tissues: usize,
+    terms: usize,
+) -> usize {
+    let tiles = match element {
+        Element::NodalStrain => patch_tiles_for(nodes, elements, tissues),
+        _ => tiles_for(elements),
+    };
+    tiles.saturating_mul(2 * VECTORS_OF_TERM).saturating_mul(terms)
 }
 
 /// How many tissues the elements of a material may be of.
@@ -244,6 +262,12 @@ impl SceneFacts {
     #[must_use]
     pub fn tile_count(&self) -> usize {
         self.partitions.tiles()
+    }
+
+    /// Terms of the tissue that relaxes with most.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn terms(&self) -> usize {
+        self.terms
     }
 
     /// Rows of patches in use, for nodal strain.
@@ -478,7 +502,7 @@ impl<'a, M: Material> SceneView<'a, M> {
     }
 
     /// Tiles of what relaxes: elements, or with nodal strain patches.
-    fn relaxing_tiles(&self) -> usize {
+    pub(crate) fn relaxing_tiles(&self) -> usize {
         if self.element().is_nodal_strain() { self.patches.tiles().len() } else { self.tiles.len() }
     }
 
@@ -498,6 +522,19 @@ impl<'a, M: Material> SceneView<'a, M> {
     #[must_use]
     pub fn memory_vectors(&self) -> usize {
         2 * self.relaxing_tiles() * self.vectors_of_tile()
+    }
+
+    /// A checksum of what relaxes, in its order: memory of a state stays where it is in a scene with the same.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) fn memory_checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        if self.memory_vectors() > 0 {
+            match self.element().is_nodal_strain() {
+                true => self.patches.tiles().iter().for_each(|tile| hasher.update(bytemuck::bytes_of(tile))),
+                false => hasher.update(bytemuck::must_cast_slice(self.tiles)),
+            }
+        }
+        hasher.finalize()
     }
 
     /// How tissue relaxes from the middle of the last step to that of the next, in step `step`; nothing if none does.

@@ -300,9 +300,14 @@ impl<'a> StateView<'a> {
             [displacement.0, increment.0] = at(node).map(|[x, y, z]| [x, y, z, 0.0]);
         }
         self.remainder.fill(NodeVector::ZERO);
-        self.memory.fill(NodeVector::ZERO);
+        self.forget();
         (self.progress.time, self.progress.dt, self.progress.seen) = (time, seconds, None);
         forget_crushed(self.volume);
+    }
+
+    /// Lets tissue that relaxes forget: nothing has been deformed so far.
+    pub(crate) fn forget(&mut self) {
+        self.memory.fill(NodeVector::ZERO);
     }
 
     /// What tissue remembers, and where the next step writes it.

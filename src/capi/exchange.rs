@@ -4,6 +4,7 @@ use core::slice::{from_mut, from_ref};
 
 use crate::copy::copy;
 use crate::material::TissueValues;
+use crate::simulation::carry;
 use crate::tled;
 
 use super::contact::supple_contact_carry_on;
@@ -12,7 +13,7 @@ use super::memory::{self, array, bytes_of, one};
 use super::pulls::let_go_of_removed;
 use super::scene::{OpenScene, set_tissues, supple_scene, supple_tissue};
 use super::simulation::{keep_steps, objects_of, points_of, prepare, supple_settings, supple_sim, supple_sim_objects};
-use super::state::{opened, opened_of, supple_state};
+use super::state::{opened_of, remember_in, supple_state};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use super::vectors::overlap;
 use supple_status::*;
@@ -20,12 +21,16 @@ use supple_status::*;
 /// Lets a state go on in a scene that has taken the place of another one of the same nodes and kind of element: without
 /// some elements, with other tissues. Displacements, velocities and time stay, so what stays of the tissue keeps its
 /// momentum; the energy balance begins anew. All that was prepared for the former scene, apart from loads and contact,
-/// must be prepared again, and the step be set. It takes as long as an exact step or two.
+/// must be prepared again, and the step be set. It takes as long as an exact step or two. Tissue that relaxes goes on where
+/// all elements and patches are as before, in scenes with other constants, densities or supports; elsewhere it begins as if
+/// nothing had been deformed so far (supple_sim_carry_on does not). SUPPLE_E_NO_RELAXATION: the state has too little memory
+/// for what it must remember, as the former scene had fewer terms or tissues.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_carry_on(scene: *const supple_scene, state: *mut supple_state) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let go_on = || unsafe {
         let open = OpenScene::of(scene)?;
+        remember_in(&open, state)?;
         let state_of_scene = opened_of(&open, state)?;
         let capacity = state_of_scene.capacity();
         if !tled::carry_on_in(open.view(), state_of_scene) {
@@ -102,7 +107,7 @@ pub unsafe extern "C" fn supple_sim_set_tissues(
 /// Lets a simulation that has just been set up go on where another one is, of a body of the same points: without some
 /// elements (supple_scene_config.removed), with other tissues, another kind of element or other supports. It takes over
 /// displacements, velocities, time, gravity, forces, motions, pressures, pulls, and where it has a surface the instruments with what
-/// they hold; what stays of the tissue keeps its momentum, and the energy balance begins anew. Nodes that belong to no
+/// they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. Nodes that belong to no
 /// element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
 /// is left as it is, may go on, and its memory be used for the next exchange. supple_sim_setup, which takes longest, may
 /// run on another thread while the other simulation goes on. This takes as long as supple_sim_set.
@@ -131,17 +136,20 @@ pub unsafe extern "C" fn supple_sim_carry_on(
             return Err(supple_error::from(SUPPLE_E_OVERLAP));
         }
         same_points(points_of(sim), points_of(from))?;
-        let open = OpenScene::of(new.scene)?;
+        let (open, former) = (OpenScene::of(new.scene)?, OpenScene::of(old.scene)?);
+        let (mut to, mut before) = (opened_of(&open, new.state)?, opened_of(&former, old.state)?);
         can_take_over(new.loads, old.loads, &open)?;
         // The last that may be refused.
         take_over_instruments(&new, &old)?;
         take_over(new.loads, old.loads)?;
         let_go_of_removed(memory::read(new.loads.cast_const())?.pulls(), &open)?;
-        let (to, before) = (opened_of(&open, new.state)?, opened(old.state)?);
         copy(to.displacement, before.displacement);
         copy(to.remainder, before.remainder);
         copy(to.increment, before.increment);
         copy(from_mut(to.progress), from_ref(before.progress));
+        let [remembered, _] = before.copies_of_memory();
+        let [now, room] = to.copies_of_memory();
+        carry((former.view(), remembered), (open.view(), now), room);
         tled::carry_on_in(open.view(), to);
         let clock = (*from).clock();
         (*sim).set_clock(clock);

@@ -5,9 +5,10 @@ use core::slice::from_mut;
 
 use crate::copy::copy_apart;
 use crate::element::{ElementTile, NodeInertia, PatchRow};
-use crate::material::{Element, TissueValues};
+use crate::material::{Element, LONGEST, MOST_SHARE, MOST_TERMS, Prony, PronyError, SHORTEST, TissueValues};
 use crate::mesh::{Mesh, Winding};
-use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
+use crate::scene::{Axes, SceneFacts, SceneView, Support, memory_vectors_for, patch_rows_for, tiles_for};
+use crate::state::NodeVector;
 use crate::tled;
 
 use super::SUPPLE_NONE;
@@ -56,6 +57,19 @@ pub struct supple_tissue {
 }
 const _: () = assert!(size_of::<supple_tissue>() == size_of::<TissueValues>());
 
+/// How a tissue relaxes: a Prony series of at most three terms. Of the stress that changes the shape, term `i` relaxes the
+/// share `share[i]` with the time `seconds[i]`; pressure does not relax. The constants of the law are those of a motion
+/// that is over before anything relaxes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_prony {
+    /// Positive, at most 0.99 in sum; 0: no such term.
+    pub share: [f32; 3],
+    /// From 1e-6 to 1e6 s; ignored where the share is 0.
+    pub seconds: [f32; 3],
+}
+const _: () = assert!(size_of::<supple_prony>() == size_of::<Prony>());
+
 /// What a scene is built from. Everything is copied; nothing needs to stay.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -93,6 +107,9 @@ pub struct supple_scene_config {
     /// For each element 1 if it is removed, as after a resection, else 0; NULL: none is. Nodes and elements keep their
     /// numbers; nodes without an element left are held where they are and weigh nothing.
     pub removed: *const u8,
+    /// How each of the `tissues` relaxes; NULL: none does. Needs more memory: supple_prony_size, supple_relaxation_size.
+    /// Only in a library with all laws.
+    pub prony: *const supple_prony,
 }
 
 /// What is simulated: element tables, masses, supports. After supple_scene_init nothing but supple_set_tissues changes
@@ -103,6 +120,8 @@ pub struct supple_scene {
     nodes: u32,
     elements: u32,
     tissues: u32,
+    /// Entries of the series: all tissues, or none where no tissue relaxes.
+    series: u32,
     element: Element,
     /// Which of the laws; its constants are those of the tissues.
     law: SceneLaw,
@@ -140,6 +159,7 @@ pub struct supple_scene_facts {
 mod contents {
     use crate::material::Element;
     pub(in crate::capi) use crate::material::{AnyLaw as SceneLaw, AnyMaterial as SceneMaterial};
+    use crate::material::{Prony, TissueValues};
 
     /// The elements that there are; the number of each is its place.
     pub(super) const ELEMENTS: &[Element] = &Element::ALL;
@@ -148,18 +168,41 @@ mod contents {
     pub(super) fn law_of(number: u32) -> Option<SceneLaw> {
         SceneLaw::all().find(|law| number.checked_mul(2) == Some(law.code()))
     }
+
+    /// Whether tissue may relax.
+    pub(super) const RELAXES: bool = true;
+
+    pub(super) const fn material_of<'a>(
+        (element, law): (Element, SceneLaw),
+        tissues: &'a [TissueValues],
+        of_element: &'a [u16],
+        prony: &'a [Prony],
+    ) -> SceneMaterial<'a> {
+        SceneMaterial { element, law, tissues, of_element, prony }
+    }
 }
 
 /// What scenes of this library are made of: the first law of the list, without nodal strain.
 #[cfg(not(feature = "capi"))]
 mod contents {
     pub(in crate::capi) use crate::material::NeoHookean as SceneLaw;
-    use crate::material::{AnyMaterial, Element, Laws, Material, Tissue, TissueValues};
+    use crate::material::{AnyMaterial, Element, Laws, Material, Prony, Tissue, TissueValues};
 
     pub(super) const ELEMENTS: &[Element] = &[Element::Linear, Element::NodalPressure];
 
     pub(super) fn law_of(number: u32) -> Option<SceneLaw> {
         (number == 0).then(SceneLaw::default)
+    }
+
+    pub(super) const RELAXES: bool = false;
+
+    pub(super) const fn material_of<'a>(
+        (element, law): (Element, SceneLaw),
+        tissues: &'a [TissueValues],
+        of_element: &'a [u16],
+        _: &'a [Prony],
+    ) -> SceneMaterial<'a> {
+        SceneMaterial { element, law, tissues, of_element }
     }
 
     #[derive(Clone, Copy)]
@@ -200,7 +243,7 @@ mod contents {
     }
 }
 pub(super) use contents::SceneMaterial;
-use contents::{ELEMENTS, SceneLaw, law_of};
+use contents::{ELEMENTS, RELAXES, SceneLaw, law_of, material_of};
 
 /// A scene in the memory of its object.
 pub(super) struct OpenScene<'a> {
@@ -209,6 +252,8 @@ pub(super) struct OpenScene<'a> {
     tiles: &'a [ElementTile],
     patches: &'a [PatchRow],
     facts: &'a SceneFacts,
+    /// What the state of any such scene remembers at most, bytes.
+    room_to_remember: usize,
 }
 
 impl<'a> OpenScene<'a> {
@@ -218,19 +263,23 @@ impl<'a> OpenScene<'a> {
         // SAFETY: the caller's promise; all arrays were written by `build`.
         unsafe {
             memory::is(object)?;
-            let &supple_scene { nodes, elements, tissues, element, law, ref facts, .. } = &*object;
+            let &supple_scene { nodes, elements, tissues, series, element, law, ref facts, .. } = &*object;
             let mut arrays = Arrays::behind(object);
             Ok(Self {
                 nodes: arrays.read(nodes as usize),
                 tiles: arrays.read(tiles_for(elements as usize)),
-                material: SceneMaterial {
-                    element,
-                    law,
-                    tissues: arrays.read(tissues as usize),
-                    of_element: arrays.read(regions(elements, tissues)),
-                },
+                material: material_of(
+                    (element, law),
+                    arrays.read(tissues as usize),
+                    arrays.read(regions(elements, tissues)),
+                    arrays.read(series as usize),
+                ),
                 patches: arrays.read(facts.patch_row_count()),
                 facts,
+                room_to_remember: match RELAXES {
+                    true => supple_relaxation_size(nodes, elements, tissues, element.code(), facts.terms() as u32),
+                    false => 0,
+                },
             })
         }
     }
@@ -247,6 +296,11 @@ impl<'a> OpenScene<'a> {
         self.material.element
     }
 
+    /// Vectors for what its tissue remembers: in a state's memory, and those in use.
+    pub(super) fn remembers(&self) -> [usize; 2] {
+        [self.room_to_remember / size_of::<NodeVector>(), self.view().memory_vectors()]
+    }
+
     /// That something was made for the scene's number of nodes.
     pub(super) fn fits(&self, nodes: u32) -> Answer<()> {
         let needed = self.node_count();
@@ -259,21 +313,42 @@ const fn regions(elements: u32, tissues: u32) -> usize {
     if tissues > 1 { elements as usize } else { 0 }
 }
 
-/// With so many rows of patches.
-fn layout(nodes: u32, elements: u32, tissues: u32, patch_rows: usize) -> Layout {
+/// With so many entries of series and rows of patches.
+fn layout(nodes: u32, elements: u32, tissues: u32, series: u32, patch_rows: usize) -> Layout {
     Layout::of::<supple_scene>()
         .and::<NodeInertia>(nodes as usize)
         .and::<ElementTile>(tiles_for(elements as usize))
         .and::<TissueValues>(tissues as usize)
         .and::<u16>(regions(elements, tissues))
+        .and::<Prony>(series as usize)
         .and::<PatchRow>(patch_rows)
 }
 
 /// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
-/// With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
+/// With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_scene_size(nodes: u32, elements: u32, tissues: u32) -> usize {
-    layout(nodes, elements, tissues, 0).bytes()
+    layout(nodes, elements, tissues, 0, 0).bytes()
+}
+
+/// Bytes of memory that a scene with tissue that relaxes needs more than supple_scene_size. SUPPLE_PRONY_SIZE is the same
+/// as a constant.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_prony_size(tissues: u32) -> usize {
+    let series = (tissues as usize).checked_mul(size_of::<Prony>());
+    series.and_then(|bytes| bytes.checked_next_multiple_of(memory::SUPPLE_ALIGN)).unwrap_or(0)
+}
+
+/// Bytes of memory that the state of a scene with tissue that relaxes needs more than supple_state_size, for what the
+/// tissue remembers. SUPPLE_RELAXATION_SIZE is the same as a constant.
+///
+/// @param element SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
+/// @param terms of the tissue that has most: 1 to 3.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_relaxation_size(nodes: u32, elements: u32, tissues: u32, element: u32, terms: u32) -> usize {
+    let [nodes, elements, tissues, terms] = [nodes, elements, tissues, terms].map(|count| count as usize);
+    let vectors = |element| memory_vectors_for(element, nodes, elements, tissues, terms.min(MOST_TERMS));
+    Element::of_code(element).map_or(0, vectors).checked_mul(size_of::<NodeVector>()).unwrap_or(0)
 }
 
 /// Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any
@@ -286,11 +361,11 @@ pub extern "C" fn supple_patches_size(nodes: u32, elements: u32, tissues: u32) -
     rows.checked_mul(size_of::<PatchRow>()).unwrap_or(0)
 }
 
-/// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size,
-/// aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is
-/// told by supple_scene_describe; the rest is free for other use.
+/// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, with
+/// tissue that relaxes and supple_prony_size, aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning
+/// of that memory. What it takes of it is told by supple_scene_describe; the rest is free for other use.
 ///
-/// @param error may be NULL; index is that of an element, a support or a node as the status says.
+/// @param error may be NULL; index is that of an element, a support, a node or a tissue as the status says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_scene_init(
     memory: *mut c_void,
@@ -304,21 +379,22 @@ pub unsafe extern "C" fn supple_scene_init(
         let (config, scene) = (one(config)?, place_for(scene)?);
         let (law, element, parts) = CheckedBody::checked(config)?;
         let &supple_scene_config { nodes, elements, tissues, .. } = config;
-        let without_patches = layout(nodes, elements, tissues, 0).bytes();
+        let series = parts.series.len() as u32;
+        let without_patches = layout(nodes, elements, tissues, series, 0).bytes();
         let room = match bytes.min(isize::MAX as usize).checked_sub(without_patches) {
             _ if element != Element::NodalStrain => 0,
             Some(rest) => rest / size_of::<PatchRow>(),
             None => patch_rows_for(nodes as usize, elements as usize, tissues as usize),
         };
-        let place = Place::new(memory, bytes, layout(nodes, elements, tissues, room))?;
+        let place = Place::new(memory, bytes, layout(nodes, elements, tissues, series, room))?;
         let facts = parts.build(law, element, room, place.arrays::<supple_scene>());
         let facts = facts.map_err(|error| match error.status {
             // So far of the patches alone.
             SUPPLE_E_SHORT => short(bytes, without_patches.saturating_add(error.limit as usize)),
             _ => error,
         })?;
-        let place = place.shrunk(layout(nodes, elements, tissues, facts.patch_row_count()));
-        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, element, law, facts }));
+        let place = place.shrunk(layout(nodes, elements, tissues, series, facts.patch_row_count()));
+        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, series, element, law, facts }));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -331,6 +407,7 @@ struct CheckedBody<'a> {
     supports: &'a [supple_support],
     tissues: &'a [supple_tissue],
     of_element: &'a [u16],
+    series: &'a [supple_prony],
 }
 
 impl<'a> CheckedBody<'a> {
@@ -350,9 +427,7 @@ impl<'a> CheckedBody<'a> {
         if nodes == 0 || elements == 0 {
             return Err(SUPPLE_E_MESH_EMPTY.into());
         }
-        if tissues == 0 || tissues > u32::from(u16::MAX) {
-            return Err(supple_error::from(SUPPLE_E_TISSUE).value(tissues.into(), u16::MAX.into()));
-        }
+        tissues_of(config)?;
         // SAFETY: the caller's promise.
         let (points, tets, supports, tissues, of_element) = unsafe {
             (
@@ -368,9 +443,9 @@ impl<'a> CheckedBody<'a> {
             check_choice(index, support.moves, 1)?;
         }
         // SAFETY: the caller's promise.
-        let removed = unsafe { removed_of(config)? };
+        let (removed, (series, _)) = unsafe { (removed_of(config)?, series_of(config)?) };
         let mesh = Mesh::new(points, tets, winding)?.without(removed)?;
-        Ok((law, element, Self { mesh, supports, tissues, of_element }))
+        Ok((law, element, Self { mesh, supports, tissues, of_element, series }))
     }
 
     /// # Safety
@@ -382,14 +457,15 @@ impl<'a> CheckedBody<'a> {
         patch_rows: usize,
         mut arrays: Arrays,
     ) -> Answer<SceneFacts> {
-        let Self { mesh, supports, tissues: given, of_element } = self;
+        let Self { mesh, supports, tissues: given, of_element, series } = self;
         // SAFETY: the caller's promise; what is not any bits is written before it is read.
-        let (nodes, tiles, tissues, regions, patches) = unsafe {
+        let (nodes, tiles, tissues, regions, prony, patches) = unsafe {
             (
                 arrays.change::<NodeInertia>(mesh.points().len()),
                 arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
                 arrays.change::<TissueValues>(given.len()),
                 arrays.change::<u16>(of_element.len()),
+                arrays.change::<Prony>(series.len()),
                 arrays.change::<PatchRow>(patch_rows),
             )
         };
@@ -399,13 +475,24 @@ impl<'a> CheckedBody<'a> {
         for (region, &given) in regions.iter_mut().zip(*of_element) {
             *region = given;
         }
+        for (tissue, (prony, given)) in prony.iter_mut().zip(*series).enumerate() {
+            *prony = prony_of(tissue, given)?;
+        }
         let supports = supports.iter().map(|support| Support {
             node: support.node,
             axes: axes_of(support.axes),
             moves: support.moves == 1,
         });
-        let material = SceneMaterial { element, law, tissues, of_element: regions };
+        let material = material_of((element, law), tissues, regions, prony);
         Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches)?)
+    }
+}
+
+/// How many tissues there are.
+fn tissues_of(config: &supple_scene_config) -> Answer<u32> {
+    match config.tissues {
+        0 | 0x1_0000.. => Err(supple_error::from(SUPPLE_E_TISSUE).value(config.tissues.into(), u16::MAX.into())),
+        tissues => Ok(tissues),
     }
 }
 
@@ -425,6 +512,51 @@ unsafe fn removed_of(config: &supple_scene_config) -> Answer<&[bool]> {
     Ok(bytemuck::checked::try_cast_slice(marks).unwrap_or_default())
 }
 
+/// The series of the tissues, and how many terms the one with most has; none where no tissue relaxes.
+///
+/// # Safety
+/// As at [`CheckedBody::checked`].
+pub(super) unsafe fn series_of(config: &supple_scene_config) -> Answer<(&[supple_prony], usize)> {
+    if config.prony.is_null() {
+        return Ok((&[], 0));
+    }
+    let tissues = tissues_of(config)?;
+    // SAFETY: the caller's promise.
+    let given = unsafe { array(config.prony, tissues as usize)? };
+    let mut most = 0;
+    for (tissue, series) in given.iter().enumerate() {
+        most = most.max(prony_of(tissue, series)?.terms());
+    }
+    Ok(if most == 0 { (&[], 0) } else { (given, most) })
+}
+
+/// The series of a tissue.
+fn prony_of(tissue: usize, given: &supple_prony) -> Answer<Prony> {
+    let terms = given.share.into_iter().zip(given.seconds).enumerate().filter(|(_, (share, _))| *share != 0.0);
+    let (mut found, mut places, mut count) = ([[0.0; 2]; MOST_TERMS], [0; MOST_TERMS], 0);
+    for ((term, at), (place, (share, seconds))) in found.iter_mut().zip(&mut places).zip(terms) {
+        (*term, *at, count) = ([share, seconds], place, count + 1);
+    }
+    if !RELAXES && count > 0 {
+        return Err(supple_error::from(SUPPLE_E_CHOICE).at(tissue).value(count as f64, 0.0));
+    }
+    Prony::new(found.get(..count).unwrap_or_default()).map_err(|error| {
+        let is = |status: supple_status| supple_error::from(status).at(tissue);
+        let place = |term: usize| places.get(term).copied().unwrap_or_default();
+        match error {
+            PronyError::Share { term, value } => {
+                is(SUPPLE_E_RELAXATION_SHARE).axis(place(term)).value(value.into(), MOST_SHARE.into())
+            }
+            PronyError::Seconds { term, value } => {
+                let limit = if value > LONGEST { LONGEST } else { SHORTEST };
+                is(SUPPLE_E_RELAXATION_TIME).axis(place(term)).value(value.into(), limit.into())
+            }
+            PronyError::Sum { value } => is(SUPPLE_E_RELAXATION_SHARE).value(value.into(), MOST_SHARE.into()),
+            PronyError::Count { terms } => is(SUPPLE_E_CAPACITY).value(terms as f64, MOST_TERMS as f64),
+        }
+    })
+}
+
 /// Gives the tissues of a scene other constants. Nothing is changed where they cannot be, or are of other densities, for
 /// which a scene must be built anew.
 ///
@@ -438,8 +570,7 @@ pub(super) unsafe fn set_tissues(scene: *mut supple_scene, tissues: &[TissueValu
         if tissues.len() != material.tissues.len() {
             return Err(mismatch(tissues.len(), material.tissues.len()));
         }
-        let &SceneMaterial { element, law, of_element, .. } = material;
-        let new = SceneMaterial { element, law, tissues, of_element };
+        let new = SceneMaterial { tissues, ..*material };
         let mut changed = [**facts];
         let [facts] = &mut changed;
         if !facts.change_constants(tiles, material, &new)? {

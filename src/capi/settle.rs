@@ -66,7 +66,7 @@ pub extern "C" fn supple_settle_size(nodes: u32) -> usize {
 
 /// Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
 /// Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
-/// go to where they are asked for. Velocities are zero afterwards, and the energy balance begins with the strain energy.
+/// go to where they are asked for, and tissue that relaxes has had the time. Velocities are zero afterwards, and the energy balance begins with the strain energy.
 /// Steps of every kind go on from there; a guard begins anew.
 ///
 /// SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
@@ -140,8 +140,8 @@ pub unsafe extern "C" fn supple_sim_settle(
 }
 
 /// Puts the nodes at displacements of yours, at a stop: velocities are zero, time stays, and the energy balance begins
-/// with the strain energy. It counts as a step. Fixed nodes keep what is given, moved ones until a motion moves them. Of
-/// a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
+/// with the strain energy. It counts as a step. What tissue that relaxes remembers stays. Fixed nodes keep what is given,
+/// moved ones until a motion moves them. Of a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
 ///
 /// @param displacements three components of each of `nodes` nodes, m, from rest.
 /// @param nodes must be that of the scene.

@@ -27,8 +27,8 @@ use super::learned::{
 use super::loads::{CallLoads, supple_loads, supple_loads_init, supple_loads_size, supple_set_contact};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
 use super::scene::{
-    OpenScene, check_choice, supple_patches_size, supple_scene, supple_scene_config, supple_scene_init,
-    supple_scene_size,
+    OpenScene, check_choice, series_of, supple_patches_size, supple_prony_size, supple_relaxation_size, supple_scene,
+    supple_scene_config, supple_scene_init, supple_scene_size,
 };
 use super::state::{critical_step, opened_of, supple_state, supple_state_init, supple_state_size};
 use super::status::{Answer, short, status_of, supple_error, supple_status};
@@ -142,8 +142,9 @@ enum Prepared {
 struct Exact {
     pace: Pace,
     damping: f32,
-    /// Where its vectors are.
+    /// Where its vectors are, and how many.
     kept: usize,
+    vectors: usize,
 }
 
 /// The objects of a simulation, for all functions that take them.
@@ -249,8 +250,8 @@ pub unsafe extern "C" fn supple_default_settings(settings: *mut supple_settings)
 
 /// Writes how many bytes of memory are enough for a simulation. supple_sim_describe tells how many it takes.
 ///
-/// @param body what it will be built from; of it the numbers of nodes, elements and tissues and the element are looked
-/// at.
+/// @param body what it will be built from; of it the numbers of nodes, elements and tissues, the element and how tissues
+/// relax are looked at.
 /// @param error may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_sim_size(
@@ -262,7 +263,7 @@ pub unsafe extern "C" fn supple_sim_size(
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
         let ((body, settings), bytes) = (given(body, settings)?, place_for(bytes)?);
-        bytes.write(size_of_all(body, settings));
+        bytes.write(size_of_all(body, settings)?);
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -287,7 +288,7 @@ pub unsafe extern "C" fn supple_sim_setup(
         let ((body, settings), sim) = (given(body, settings)?, place_for(sim)?);
         let made = build(memory, bytes, body, settings).map_err(|error| match error.status {
             // So far of one of its objects alone.
-            SUPPLE_E_SHORT => short(bytes, size_of_all(body, settings)),
+            SUPPLE_E_SHORT => size_of_all(body, settings).map_or(error, |needed| short(bytes, needed)),
             _ => error,
         })?;
         sim.write(made);
@@ -447,8 +448,15 @@ unsafe fn given<'a>(
 }
 
 /// Never less than what the objects take.
-fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize {
+///
+/// # Safety
+/// As at [`supple_sim_size`].
+unsafe fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> Answer<usize> {
     let &supple_scene_config { nodes, elements, tissues, .. } = body;
+    // SAFETY: the caller's promise.
+    let (series, terms) = unsafe { series_of(body)? };
+    let remembered = supple_relaxation_size(nodes, elements, tissues, body.element, terms as u32);
+    let of_memory = remembered / size_of::<NodeVector>();
     let element = Element::of_code(body.element).unwrap_or_default();
     let patches = if element.is_nodal_strain() { supple_patches_size(nodes, elements, tissues) } else { 0 };
     let surface = &settings.surface;
@@ -459,8 +467,8 @@ fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize 
     let (node_count, element_count) = (nodes as usize, elements as usize);
     let cells = if settings.cells == [0; 3] { Cells::Suggested } else { Cells::Given(settings.cells) };
     let of_method = vectors_at_most(element, node_count, element_count, cells);
-    let of_guard = guard_vectors(element, node_count, element_count);
-    let of_pace = vectors_for_pace(node_count, 0);
+    let of_guard = guard_vectors(element, node_count, element_count).saturating_add(of_memory);
+    let of_pace = vectors_for_pace(node_count, of_memory);
     let arrays = |count| Layout::of::<supple_sim>().and::<NodeVector>(count).bytes();
     let steps = match settings.steps {
         SUPPLE_STEPS_EXACT => arrays(of_pace),
@@ -469,19 +477,20 @@ fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize 
         _ => supple_learned_size(nodes, settings.fallback).saturating_add(arrays(of_pace)),
     };
     let guard = if settings.is_guarded() { guard::layout(of_guard).bytes() } else { 0 };
-    [
+    let sizes = [
         layout(nodes).bytes(),
         supple_scene_size(nodes, elements, tissues),
+        if series.is_empty() { 0 } else { supple_prony_size(tissues) },
         patches,
         supple_state_size(nodes, body.element),
+        remembered,
         supple_loads_size(settings.forces, settings.motions),
         contact,
         steps,
         guard,
-    ]
-    .into_iter()
+    ];
     // Patches end anywhere.
-    .fold(memory::SUPPLE_ALIGN, usize::saturating_add)
+    Ok(sizes.into_iter().fold(memory::SUPPLE_ALIGN, usize::saturating_add))
 }
 
 /// The front, and the points of the scene at rest.
@@ -690,7 +699,8 @@ pub(super) unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -
         }
         let mut room = Room { start: sim.cast(), used: steps, bytes };
         (*sim).prepared = Prepared::None;
-        let made = made(settings, critical, &mut room, (scene, state), points)?;
+        let of_pace = vectors_for_pace(points.len(), open.view().memory_vectors());
+        let made = made(settings, critical, &mut room, (scene, state), points, of_pace)?;
         ((*sim).prepared, (*sim).end) = (made, room.used);
         (*sim).work = if settings.most_steps == 0 { Work::UNBOUNDED } else { Work::of(settings.most_steps) };
         Ok(())
@@ -724,7 +734,7 @@ unsafe fn needed(
             }
             Ok::<_, supple_error>(request)
         };
-        let pace = vectors_for_pace(nodes, 0) * size_of::<NodeVector>();
+        let pace = vectors_for_pace(nodes, open.view().memory_vectors()) * size_of::<NodeVector>();
         let exact = |damping| Pace::of(settings.given_seconds(), damping, critical).map(|_| pace);
         let steps = match settings.steps {
             SUPPLE_STEPS_EXACT => exact(settings.damping)?,
@@ -753,6 +763,7 @@ unsafe fn made(
     room: &mut Room,
     (scene, state): (*const supple_scene, *mut supple_state),
     points: &[[f32; 3]],
+    of_pace: usize,
 ) -> Answer<Prepared> {
     let seconds = seconds_of(settings, critical);
     let first = points.as_ptr().cast::<f32>();
@@ -761,7 +772,7 @@ unsafe fn made(
         let large = settings.large(seconds);
         let exact = |room: &mut Room, damping| {
             let pace = Pace::of(settings.given_seconds(), damping, critical)?;
-            Ok::<_, supple_error>(Exact { pace, damping, kept: room.vectors(vectors_for_pace(points.len(), 0))? })
+            Ok::<_, supple_error>(Exact { pace, damping, kept: room.vectors(of_pace)?, vectors: of_pace })
         };
         let guarded = |room: &mut Room, seconds, damping, every| {
             if !settings.is_guarded() {
@@ -811,11 +822,9 @@ impl Prepared {
     unsafe fn mover<'a>(&'a mut self, sim: *mut supple_sim) -> Answer<Mover<'a, 'static>> {
         // SAFETY: the caller's promise; objects lie where they were put.
         unsafe {
-            let nodes = (*sim).nodes;
             let at = |place: usize| sim.cast::<u8>().add(place);
-            let exact = |Exact { pace, damping, kept }: &'a mut Exact| {
-                let count = vectors_for_pace(nodes as usize, 0);
-                let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), count);
+            let exact = |Exact { pace, damping, kept, vectors }: &'a mut Exact| {
+                let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), *vectors);
                 ExactSteps::Paced { pace, kept, damping: *damping }
             };
             let guarded = |place: usize| if place > 0 { guard::opened(at(place).cast()).map(Some) } else { Ok(None) };

@@ -20,9 +20,13 @@ pub struct supple_state {
     pub(super) nodes: u32,
     /// Of the scene that it was prepared for.
     element: Element,
-    has_step: bool,
+    /// Vectors of what tissue remembers, both copies, and a checksum of the tables that they belong to.
+    remembered: usize,
+    tables: u32,
+    /// Of the step; zero without one.
+    step_seconds: f32,
+    step_damping: f32,
     pub(super) progress: Progress,
-    step: Step,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -58,7 +62,8 @@ const fn volumes(nodes: u32, element: Element) -> usize {
     }
 }
 
-fn layout(nodes: u32, element: Element) -> Layout {
+/// With room for so many vectors of what tissue remembers.
+fn layout(nodes: u32, element: Element, remembered: usize) -> Layout {
     let volumes = volumes(nodes, element);
     let nodes = nodes as usize;
     Layout::of::<supple_state>()
@@ -67,18 +72,20 @@ fn layout(nodes: u32, element: Element) -> Layout {
         .and::<NodeVector>(nodes)
         .and::<NodeVector>(nodes)
         .and::<NodeVector>(volumes)
+        .and::<NodeVector>(remembered)
 }
 
 /// Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
-/// the same as a constant.
+/// the same as a constant. With tissue that relaxes it needs supple_relaxation_size bytes more.
 ///
 /// @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_state_size(nodes: u32, element: u32) -> usize {
-    Element::of_code(element).map_or(0, |element| layout(nodes, element).bytes())
+    Element::of_code(element).map_or(0, |element| layout(nodes, element, 0).bytes())
 }
 
-/// Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.
+/// Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, with tissue that relaxes and
+/// supple_relaxation_size, aligned to SUPPLE_ALIGN.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_init(
     memory: *mut c_void,
@@ -91,17 +98,27 @@ pub unsafe extern "C" fn supple_state_init(
         let (open, state) = (OpenScene::of(scene)?, place_for(state)?);
         let nodes = open.node_count() as u32;
         let element = open.element();
-        let place = Place::new(memory, bytes, layout(nodes, element))?;
-        let step = Step::unchecked(1.0, 0.0)?;
+        let [room, remembered] = open.remembers();
+        let place = Place::new(memory, bytes, layout(nodes, element, room))?;
         let mut progress = Progress::START;
-        view(place.arrays::<supple_state>(), nodes, element, &mut progress).reset();
-        state.write(place.put(|head| supple_state { head, nodes, element, has_step: false, progress, step }));
+        let tables = open.view().memory_checksum();
+        view(place.arrays::<supple_state>(), nodes, element, remembered, &mut progress).reset();
+        state.write(place.put(|head| supple_state {
+            head,
+            nodes,
+            element,
+            remembered,
+            tables,
+            step_seconds: 0.0,
+            step_damping: 0.0,
+            progress,
+        }));
         Ok(SUPPLE_OK)
     };
     status_of(init())
 }
 
-/// Puts a state back to rest at time zero. Its step stays. The first step of a supple_large computes its inertia anew;
+/// Puts a state back to rest at time zero; tissue that relaxes remembers nothing. Its step stays. The first step of a supple_large computes its inertia anew;
 /// a supple_learned needs supple_learned_reset and a new lead-in.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_status {
@@ -113,8 +130,8 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
     status_of(reset())
 }
 
-/// Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the
-/// strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
+/// Stops all motion: nodes, time and what tissue remembers stay as they are, velocities are zero, and the energy balance
+/// begins with the strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
 /// needs a new lead-in.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_stop(scene: *const supple_scene, state: *mut supple_state) -> supple_status {
@@ -213,23 +230,66 @@ pub unsafe extern "C" fn supple_state_time(
 impl supple_state {
     /// The step that was set.
     pub(super) fn step(&self) -> Answer<Step> {
-        if self.has_step { Ok(self.step) } else { Err(SUPPLE_E_NO_STEP.into()) }
+        if self.step_seconds > 0.0 {
+            Ok(Step::unchecked(self.step_seconds, self.step_damping)?)
+        } else {
+            Err(SUPPLE_E_NO_STEP.into())
+        }
     }
 
     pub(super) fn set_step(&mut self, step: Option<Step>) {
-        self.has_step = step.is_some();
-        self.step = step.unwrap_or(self.step);
+        [self.step_seconds, self.step_damping] = step.map_or([0.0; 2], |step| [step.seconds(), step.damping()]);
     }
+
+    /// Bytes of what tissue remembers, one copy.
+    pub(super) const fn remembered_bytes(&self) -> usize {
+        self.remembered / 2 * size_of::<NodeVector>()
+    }
+}
+
+/// Makes room for what the tissue of another scene remembers: it stays where it is in the same tables, else nothing has
+/// been deformed so far.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn remember_in(open: &OpenScene<'_>, object: *mut supple_state) -> Answer<()> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        fits(open, object)?;
+        let &supple_state { nodes, element, remembered, tables, .. } = &*object;
+        let ([_, needed], checksum) = (open.remembers(), open.view().memory_checksum());
+        if needed == remembered && checksum == tables {
+            return Ok(());
+        }
+        let room = memory::bytes_of(object.cast_const()).saturating_sub(layout(nodes, element, 0).bytes());
+        if needed * size_of::<NodeVector>() > room {
+            return Err(other_tissue(room, needed * size_of::<NodeVector>()));
+        }
+        ((*object).remembered, (*object).tables) = (needed, checksum);
+        opened(object)?.forget();
+        Ok(())
+    }
+}
+
+/// The state has so many bytes for what tissue remembers.
+fn other_tissue(bytes: usize, needed: usize) -> supple_error {
+    supple_error::from(SUPPLE_E_NO_RELAXATION).value(bytes as f64, needed as f64)
 }
 
 /// # Safety
 /// The arrays are those of a state of so many nodes, and nobody else uses them.
-unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, element: Element, progress: &'a mut Progress) -> StateView<'a> {
+unsafe fn view<'a>(
+    mut arrays: Arrays,
+    nodes: u32,
+    element: Element,
+    remembered: usize,
+    progress: &'a mut Progress,
+) -> StateView<'a> {
     // SAFETY: the caller's promise. Any bits are vectors.
     let [displacements, remainders, increments, forces] = [(); 4].map(|()| unsafe { arrays.change(nodes as usize) });
     // SAFETY: as above.
-    let volumes = unsafe { arrays.change(volumes(nodes, element)) };
-    StateView::new(displacements, remainders, increments, forces, volumes, progress)
+    let (volumes, memory) = unsafe { (arrays.change(volumes(nodes, element)), arrays.change(remembered)) };
+    StateView::new(displacements, remainders, increments, forces, volumes, progress).remembering(memory)
 }
 
 /// The state in an object, whose other fields may be used meanwhile.
@@ -240,26 +300,40 @@ pub(super) unsafe fn opened<'a>(object: *mut supple_state) -> Answer<StateView<'
     // SAFETY: the caller's promise.
     unsafe {
         memory::is(object.cast_const())?;
-        let (nodes, element) = ((*object).nodes, (*object).element);
-        Ok(view(Arrays::behind(object.cast_const()), nodes, element, &mut (*object).progress))
+        let (nodes, element, remembered) = ((*object).nodes, (*object).element, (*object).remembered);
+        Ok(view(Arrays::behind(object.cast_const()), nodes, element, remembered, &mut (*object).progress))
     }
 }
 
-/// The same, of a state that was prepared for a scene of these nodes and elements.
+/// The same, of a state that was prepared for a scene of these nodes and elements, whose tissue remembers as much.
 ///
 /// # Safety
 /// As at [`memory::change`].
 pub(super) unsafe fn opened_of<'a>(open: &OpenScene<'_>, object: *mut supple_state) -> Answer<StateView<'a>> {
     // SAFETY: the caller's promise.
     unsafe {
-        let &supple_state { nodes, element, .. } = memory::read(object.cast_const())?;
-        open.fits(nodes)?;
-        if element != open.element() {
-            let (own, scene) = (f64::from(element.code()), f64::from(open.element().code()));
-            return Err(supple_error::from(SUPPLE_E_ELEMENT).value(own, scene));
+        fits(open, object)?;
+        let (remembered, [_, needed]) = ((*object).remembered, open.remembers());
+        if remembered != needed {
+            return Err(other_tissue(remembered * size_of::<NodeVector>(), needed * size_of::<NodeVector>()));
         }
         opened(object)
     }
+}
+
+/// That a state was prepared for a scene of these nodes and elements.
+///
+/// # Safety
+/// As at [`memory::read`].
+unsafe fn fits(open: &OpenScene<'_>, object: *const supple_state) -> Answer<()> {
+    // SAFETY: the caller's promise.
+    let &supple_state { nodes, element, .. } = unsafe { memory::read(object)? };
+    open.fits(nodes)?;
+    if element != open.element() {
+        let (own, scene) = (f64::from(element.code()), f64::from(open.element().code()));
+        return Err(supple_error::from(SUPPLE_E_ELEMENT).value(own, scene));
+    }
+    Ok(())
 }
 
 /// Displacements, their remainders, increments and forces of a state.
@@ -272,5 +346,23 @@ pub(super) unsafe fn vectors<'a>(object: *const supple_state) -> Answer<[&'a [No
         let nodes = memory::read(object)?.nodes as usize;
         let mut arrays = Arrays::behind(object);
         Ok([(); 4].map(|()| arrays.read(nodes)))
+    }
+}
+
+/// What tissue remembers at the moment of a state.
+///
+/// # Safety
+/// As at [`memory::read`].
+pub(super) unsafe fn remembered<'a>(object: *const supple_state) -> Answer<&'a [NodeVector]> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let &supple_state { nodes, element, remembered, ref progress, .. } = memory::read(object)?;
+        let mut arrays = Arrays::behind(object);
+        for count in [nodes as usize, nodes as usize, nodes as usize, nodes as usize, volumes(nodes, element)] {
+            arrays.read::<NodeVector>(count);
+        }
+        let all = arrays.read::<NodeVector>(remembered);
+        let (first, second) = all.split_at(all.len() / 2);
+        Ok(if progress.second { second } else { first })
     }
 }

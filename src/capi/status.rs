@@ -56,7 +56,8 @@ pub enum supple_status {
     SUPPLE_E_KIND = -6,
     /// A number that stands for a choice (value) is none of the choices.
     SUPPLE_E_CHOICE = -7,
-    /// Objects for scenes with other numbers of nodes (value, limit).
+    /// Objects for scenes with other numbers of nodes (value, limit), or a saved state of tissue that remembers other
+    /// bytes (value) than that of the state (limit).
     SUPPLE_E_MISMATCH = -8,
     /// More (value) than there is room for (limit).
     SUPPLE_E_CAPACITY = -9,
@@ -115,6 +116,11 @@ pub enum supple_status {
     SUPPLE_E_PULL = -36,
     /// No node is nearer to the point of pull `index` than its radius (value, m); the nearest is at the limit (m).
     SUPPLE_E_NO_NODES = -37,
+    /// Tissue `index` relaxes by a share (value; axis: which term) that is no positive number, or without an axis by more
+    /// in sum than may relax (limit).
+    SUPPLE_E_RELAXATION_SHARE = -38,
+    /// Tissue `index` relaxes with a time (value, s; axis: which term) that is not from 1e-6 to 1e6 s (limit: which of them).
+    SUPPLE_E_RELAXATION_TIME = -39,
 
     /// Weights do not begin at a multiple of four bytes.
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -176,7 +182,8 @@ pub enum supple_status {
     SUPPLE_E_NO_CONTACT = -95,
     /// The step was not taken: learned steps do not know pulls.
     SUPPLE_E_NO_PULLS = -96,
-    /// The step was not taken: learned steps do not know tissue that relaxes.
+    /// The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
+    /// (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
     SUPPLE_E_NO_RELAXATION = -97,
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
@@ -195,7 +202,7 @@ pub struct supple_error {
     pub index: u32,
     /// Number of a node, from zero.
     pub node: u32,
-    /// 0, 1, 2 for x, y, z.
+    /// 0, 1, 2 for x, y, z; or of a tissue that relaxes for the terms of its series.
     pub axis: u32,
     /// The offending value; its unit stands with the status.
     pub value: f64,
@@ -424,7 +431,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -5 => c"the memory holds no object",
         -6 => c"the memory holds an object of another type",
         -7 => c"not one of the choices",
-        -8 => c"objects of scenes with other numbers of nodes",
+        -8 => c"objects of scenes with other numbers of nodes, or of tissue that remembers other things",
         -9 => c"more than there is room for",
         -10 => c"a node that does not exist",
         -11 => c"a number is not finite",
@@ -452,6 +459,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -35 => c"the bytes of an instrument's field are none, or damaged",
         -36 => c"a pull with a point, radius, direction, target, stiffness or most force that cannot be, or without nodes",
         -37 => c"no node is nearer to the point of a pull than its radius",
+        -38 => c"a tissue relaxes by a share that is not positive, or by more than may relax in sum",
+        -39 => c"a tissue relaxes with a time that is not between a microsecond and a million seconds",
         -40 => c"the weights are not at a multiple of four bytes",
         -41 => c"the weights are shorter than their file says",
         -42 => c"not a weight file",
@@ -477,7 +486,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
-        -97 => c"the step was not taken: this kind of step does not know tissue that relaxes",
+        -97 => c"learned steps do not know tissue that relaxes, or the state has not the memory that such tissue needs",
         _ => return None,
     })
 }

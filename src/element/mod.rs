@@ -42,6 +42,7 @@ pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
 pub(crate) use patch_builder::PatchBuilder;
 pub use patch_builder::patch_rows_for;
+pub(crate) use patch_builder::patch_tiles_for;
 pub(crate) use patch_forces::PatchForces;
 pub(crate) use patch_tangents::PatchTangents;
 pub use tile::ElementTile;

@@ -20,7 +20,7 @@ const USUAL_NEIGHBOURS: usize = 48;
 #[must_use]
 pub const fn patch_rows_for(nodes: usize, elements: usize, tissues: usize) -> usize {
     let corners = elements.saturating_mul(4);
-    let patches = least(nodes.saturating_mul(tissues), corners);
+    let patches = patches_for(nodes, elements, tissues);
     let groups = most_groups(elements);
     // k elements that are joined by faces have k + 2 nodes around their common one at most. Of each tile the patch with
     // the most neighbours counts. Those of the tile before have as many or more, but the first tile of a group has none
@@ -28,6 +28,16 @@ pub const fn patch_rows_for(nodes: usize, elements: usize, tissues: usize) -> us
     let neighbours = patches.saturating_mul(2).saturating_add(corners).div_ceil(TILE);
     let tables = 1 + patches / TILE + groups + neighbours + groups * least(USUAL_NEIGHBOURS, nodes);
     tables + Lists { nodes, corners, patches, around_node: 2 * USUAL_NEIGHBOURS }.rows()
+}
+
+/// No fewer patches than any body of so many has.
+const fn patches_for(nodes: usize, elements: usize, tissues: usize) -> usize {
+    least(nodes.saturating_mul(tissues), elements.saturating_mul(4))
+}
+
+/// No fewer tiles of patches than any body of so many has: the last of each group may be partly empty.
+pub(crate) const fn patch_tiles_for(nodes: usize, elements: usize, tissues: usize) -> usize {
+    patches_for(nodes, elements, tissues) / TILE + most_groups(elements)
 }
 
 const fn least(a: usize, b: usize) -> usize {

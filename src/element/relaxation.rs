@@ -35,7 +35,6 @@ use super::tile::{vector_at, write_at};
 
 /// Components of a symmetric matrix: xx, yy, zz, xy, yz, zx.
 pub(super) const COMPONENTS: usize = 6;
-const PAIRS: [[usize; 2]; COMPONENTS] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
 
 /// Vectors of one copy of the memory of a term of a tile.
 pub(crate) const VECTORS_OF_TERM: usize = COMPONENTS * TILE / 4;
@@ -259,6 +258,12 @@ pub(crate) struct Distortion<R> {
     inverse: R,
 }
 
+/// A component of `M^T M + M + M^T`.
+#[inline(always)]
+fn square<R: Real>(m: &Matrix<R>, i: usize, j: usize) -> R {
+    m[0][i].fused(m[0][j], m[1][i].fused(m[1][j], m[2][i].fused(m[2][j], m[i][j] + m[j][i])))
+}
+
 impl<R: Real> Distortion<R> {
     /// `J^2 A / (2 W')` from `M = cof F - I` without cancellation: `J^2 I - I1 / 3 N^T N` with `N = I + M`.
     #[inline(always)]
@@ -266,12 +271,14 @@ impl<R: Real> Distortion<R> {
         let strain = i * R::splat(1.0 / 3.0);
         let factor = -(R::splat(1.0) + strain);
         let diagonal = self.change.fused(self.change, (self.change + self.change) - strain);
-        let mut shape = [factor; COMPONENTS];
-        for (component, [i, j]) in PAIRS.into_iter().enumerate() {
-            let square = m[0][i].fused(m[0][j], m[1][i].fused(m[1][j], m[2][i].fused(m[2][j], m[i][j] + m[j][i])));
-            shape[component] = if i == j { factor.fused(square, diagonal) } else { factor * square };
-        }
-        shape
+        [
+            factor.fused(square(m, 0, 0), diagonal),
+            factor.fused(square(m, 1, 1), diagonal),
+            factor.fused(square(m, 2, 2), diagonal),
+            factor * square(m, 0, 1),
+            factor * square(m, 1, 2),
+            factor * square(m, 2, 0),
+        ]
     }
 }
 

@@ -51,6 +51,8 @@ mod tissue;
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
 pub use moduli::Moduli;
+#[cfg(feature = "capi-neo-hookean")]
+pub(crate) use prony::{LONGEST, MOST_SHARE, SHORTEST};
 pub use prony::{MOST_TERMS, Prony, PronyError};
 #[cfg(feature = "std")]
 pub(crate) use response::VolumeFactor;

@@ -8,11 +8,11 @@ use core::fmt;
 pub const MOST_TERMS: usize = 3;
 
 /// The most that may relax of the stress of distortion: something has to hold the tissue.
-const MOST_SHARE: f32 = 0.99;
+pub(crate) const MOST_SHARE: f32 = 0.99;
 /// The shortest time of relaxation, s.
-const SHORTEST: f32 = 1e-6;
+pub(crate) const SHORTEST: f32 = 1e-6;
 /// The longest, s.
-const LONGEST: f32 = 1e6;
+pub(crate) const LONGEST: f32 = 1e6;
 
 /// How a tissue relaxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

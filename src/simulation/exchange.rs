@@ -7,7 +7,7 @@ use std::vec;
 use std::vec::Vec;
 
 use super::owned::{Exact, Prepared};
-use super::remembered::carried;
+use super::remembered::carry;
 use super::{Simulation, SimulationError};
 use crate::material::{AnyLaw, Law, Prony, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
@@ -65,7 +65,10 @@ impl Simulation<'_> {
         }
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?.without(&all)?;
         let scene = self.scene.exchanged(material, &mesh)?;
-        let remembered = carried(self.scene.view(), scene.view(), self.state.view().copies_of_memory()[0]);
+        let needed = scene.view().memory_vectors();
+        let mut remembered = vec![NodeVector::ZERO; needed];
+        let (now, room) = remembered.split_at_mut(needed / 2);
+        carry((self.scene.view(), self.state.view().copies_of_memory()[0]), (scene.view(), now), room);
         let former = core::mem::replace(&mut self.scene, scene);
         let removed = core::mem::replace(&mut self.changes.removed, all);
         let touchable = self.touchable.clone();

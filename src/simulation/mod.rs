@@ -21,7 +21,7 @@ mod exchange;
 mod mover;
 #[cfg(feature = "std")]
 mod owned;
-#[cfg(feature = "std")]
+#[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
 mod remembered;
 mod report;
 #[cfg(feature = "std")]
@@ -31,6 +31,8 @@ pub use clock::Clock;
 pub use mover::{Event, ExactSteps, Lead, Mover, StepKind};
 #[cfg(feature = "std")]
 pub use owned::{Simulation, SimulationError};
+#[cfg(feature = "capi-neo-hookean")]
+pub(crate) use remembered::carry;
 pub use report::Report;
 
 use crate::inertia;

@@ -1,66 +1,73 @@
 //! What tissue remembers ([`crate::element`], relaxation) when another scene of the same nodes takes the place of the one
-//! in which it came about: each element, or patch with nodal strain, keeps its own.
+//! in which it came about: each element, or patch with nodal strain, keeps its own. Without a heap.
 
-use std::collections::BTreeMap;
-use std::vec;
-use std::vec::Vec;
-
-use crate::material::{Material, VecMaterial};
+use crate::heap_sort::sort;
+use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::{NodeVector, TILE};
 
 /// Numbers of a term in a tile, one copy.
 const OF_TERM: usize = 6 * TILE;
 
-/// Where something keeps its memory: tile and place in it.
-type Place = (usize, usize);
+/// A mesh element; a node with the former tissue of its patch.
+type Key = [u32; 2];
 
-/// A mesh element, or a node with one of the elements of its patch.
-type Key = (u32, usize);
-
-/// Everything that relaxes, in the order of the tables.
-fn places(scene: SceneView<'_, VecMaterial>) -> Vec<(Key, Place)> {
-    let with_lanes = |tiles: usize| (0..tiles).flat_map(|tile| (0..TILE).map(move |lane| (tile, lane)));
-    if scene.element().is_nodal_strain() {
-        let tiles = scene.patches.tiles();
-        let places = with_lanes(tiles.len()).filter(|&(tile, lane)| tiles[tile].volume(lane) > 0.0);
-        return places
-            .map(|(tile, lane)| ((tiles[tile].node(lane) as u32, tiles[tile].element(lane)), (tile, lane)))
-            .collect();
+/// Carries the memory of a state from one copy of that in scene `old` to one in scene `new`; what was not there remembers
+/// nothing. The room is another copy, whose contents do not matter.
+pub(crate) fn carry<M: Material, N: Material>(
+    (old, before): (SceneView<'_, M>, &[NodeVector]),
+    (new, after): (SceneView<'_, N>, &mut [NodeVector]),
+    room: &mut [NodeVector],
+) {
+    after.fill(NodeVector::ZERO);
+    let terms = [4 * old.vectors_of_tile() / OF_TERM, 4 * new.vectors_of_tile() / OF_TERM];
+    let of_patches = old.element().is_nodal_strain();
+    if terms.contains(&0) || of_patches != new.element().is_nodal_strain() {
+        return;
     }
-    let places = with_lanes(scene.tiles.len()).filter(|&(tile, lane)| scene.tiles[tile].volume::<f32>(lane) > 0.0);
-    places.map(|(tile, lane)| ((0, scene.tiles[tile].element(lane)), (tile, lane))).collect()
-}
-
-/// The memory of a state in scene `new`, from one copy of that in scene `old`.
-pub(super) fn carried(
-    old: SceneView<'_, VecMaterial>,
-    new: SceneView<'_, VecMaterial>,
-    memory: &[NodeVector],
-) -> Vec<NodeVector> {
-    let mut carried = vec![NodeVector::ZERO; new.memory_vectors()];
-    let terms = |scene: SceneView<'_, VecMaterial>| 4 * scene.vectors_of_tile() / OF_TERM;
-    let (before, after) = (terms(old), terms(new));
     // A patch is that of a tissue around a node: elements may have come to be of a tissue of their own since.
-    let former = |(node, element): Key| match old.element().is_nodal_strain() {
-        true => (node, usize::from(old.material.region(element))),
-        false => (0, element),
+    let former = |(node, element): (usize, usize)| -> Key {
+        if of_patches { [node as u32, old.material.region(element).into()] } else { [0, element as u32] }
     };
-    let of_old: BTreeMap<_, _> = places(old).into_iter().map(|(key, place)| (former(key), place)).collect();
-    let from: &[f32] = bytemuck::cast_slice(memory);
-    let to: &mut [f32] = bytemuck::cast_slice_mut(&mut carried);
-    for (key, (tile, lane)) in places(new) {
-        let Some(&(old_tile, old_lane)) = of_old.get(&former(key)) else { continue };
-        for term in 0..before.min(after) {
-            for component in 0..6 {
-                let at =
-                    |tile: usize, terms: usize, lane: usize| OF_TERM * (terms * tile + term) + TILE * component + lane;
-                let value = from.get(at(old_tile, before, old_lane)).copied().unwrap_or_default();
-                if let Some(place) = to.get_mut(at(tile, after, lane)) {
-                    *place = value;
-                }
+    // Keys with their places: a tile has room for as many in one term.
+    let listed: &mut [[u32; 4]] = bytemuck::must_cast_slice_mut(room);
+    let keys = (0..places(new)).filter_map(|place| Some((former(at_place(new, place)?), place as u32)));
+    let mut count = 0;
+    for (entry, ([node, number], place)) in listed.iter_mut().zip(keys) {
+        (*entry, count) = ([node, number, place, 0], count + 1);
+    }
+    let listed = listed.get_mut(..count).unwrap_or_default();
+    let key_of = |[node, number, ..]: [u32; 4]| [node, number];
+    sort(listed, key_of);
+    let (from, to): (&[f32], &mut [f32]) = (bytemuck::must_cast_slice(before), bytemuck::must_cast_slice_mut(after));
+    for place in 0..places(old) {
+        let Some(key) = at_place(old, place).map(former) else { continue };
+        let first = listed.partition_point(|&entry| key_of(entry) < key);
+        let same = listed.get(first..).unwrap_or_default().iter().take_while(|&&entry| key_of(entry) == key);
+        for &[_, _, new_place, _] in same {
+            for (term, component) in (0..terms[0].min(terms[1])).flat_map(|term| (0..6).map(move |each| (term, each))) {
+                let at = |terms: usize, place: usize| {
+                    OF_TERM * (terms * (place / TILE) + term) + TILE * component + place % TILE
+                };
+                let value = from.get(at(terms[0], place)).copied().unwrap_or_default();
+                to.get_mut(at(terms[1], new_place as usize)).into_iter().for_each(|number| *number = value);
             }
         }
     }
-    carried
+}
+
+/// Places of what relaxes, in the order of the tables.
+fn places<M: Material>(scene: SceneView<'_, M>) -> usize {
+    TILE * scene.relaxing_tiles()
+}
+
+/// What is there: a mesh element, or a node with one of the elements of its patch.
+fn at_place<M: Material>(scene: SceneView<'_, M>, place: usize) -> Option<(usize, usize)> {
+    let (tile, lane) = (place / TILE, place % TILE);
+    if scene.element().is_nodal_strain() {
+        let tile = scene.patches.tiles().get(tile)?;
+        return (tile.volume(lane) > 0.0).then(|| (tile.node(lane), tile.element(lane)));
+    }
+    let tile = scene.tiles.get(tile)?;
+    (tile.volume::<f32>(lane) > 0.0).then(|| (0, tile.element(lane)))
 }

@@ -82,7 +82,7 @@ static struct {
     int written;
 } slots[SLOTS];
 static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, of_removed,
-    of_places, of_found, of_field, of_scratch, copies[2];
+    of_places, of_found, of_field, of_scratch, of_prony, copies[2];
 static size_t weights_bytes, damper_bytes;
 static uint32_t of_bar[4 * TETS][3], bar_triangles;
 static const char *doing;
@@ -211,12 +211,22 @@ static supple_scene_config changed_bar(void) {
         }
     }
     supple_scene_config config = {SUPPLE_CONFIG(supple_scene_config), law, number(below(2)), nodes, elements, supports_there,
-                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0, NULL};
+                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0, NULL, NULL};
     if (one_in(4)) {
         uint8_t *removed = end_of(&of_removed, elements);
         for (uint32_t n = 0; n < elements; n++) removed[n] = one_in(10);
         if (one_in(20)) removed[below(elements)] = (uint8_t)number(2);
         config.removed = removed;
+    }
+    if (one_in(3)) {
+        supple_prony *series = end_of(&of_prony, sizeof *series * tissues_there);
+        for (uint32_t n = 0; n < tissues_there; n++) {
+            for (int term = 0; term < 3; term++) {
+                series[n].share[term] = one_in(2) ? 0.0f : one_in(40) ? wild(0.2f) : 0.2f;
+                series[n].seconds[term] = one_in(20) ? wild(1e-3f) : 1e-3f * (float)(1 + below(50));
+            }
+        }
+        config.prony = series;
     }
     config.struct_size = number(config.struct_size), config.abi = number(config.abi), config.reserved = number(0);
     /* Fewer than there are, or none: more would be memory that is not the host's. */
@@ -225,9 +235,10 @@ static supple_scene_config changed_bar(void) {
     config.nodes = one_in(20) ? below(nodes + 1) : config.nodes;
     config.tissues = one_in(20) ? below(tissues_there + 1) : config.tissues;
     if (one_in(40)) {
-        const void **const pointers[5] = {(const void **)&config.points, (const void **)&config.tetrahedra, (const void **)&config.support,
-                                          (const void **)&config.tissue, (const void **)&config.tissue_of_element};
-        const void **pointer = pointers[below(5)];
+        const void **const pointers[6] = {(const void **)&config.points, (const void **)&config.tetrahedra, (const void **)&config.support,
+                                          (const void **)&config.tissue, (const void **)&config.tissue_of_element,
+                                          (const void **)&config.prony};
+        const void **pointer = pointers[below(6)];
         *pointer = one_in(2) || *pointer == NULL ? NULL : (const void *)((const char *)*pointer - 1);
     }
     return config;
@@ -237,6 +248,7 @@ static supple_status make_scene(void) {
     const supple_scene_config config = changed_bar();
     size_t needed = supple_scene_size(config.nodes, config.elements, config.tissues), bytes;
     needed += config.element == SUPPLE_NODAL_STRAIN ? supple_patches_size(config.nodes, config.elements, config.tissues) : 0;
+    needed += config.prony != NULL ? supple_prony_size(config.tissues) : 0;
     supple_scene *made = NULL;
     void *at = room(SCENE, needed, &bytes);
     return supple_scene_init(at, bytes, one_in(60) ? NULL : &config, one_in(60) ? NULL : &made, wanted());
@@ -265,7 +277,9 @@ static supple_status make_state(void) {
     const uint32_t nodes = nodes_of(scene);
     size_t bytes;
     supple_state *made = NULL;
-    void *at = room(STATE, supple_state_size(nodes, is_calm ? SUPPLE_NODAL_PRESSURE : below(3)), &bytes);
+    const uint32_t element = is_calm ? SUPPLE_NODAL_PRESSURE : below(3), terms = is_calm ? 3 : one_in(2) ? 0 : number(3);
+    const size_t remembers = terms > 3 ? 0 : supple_relaxation_size(nodes, nodes == 4 ? 1 : TETS, is_calm ? 2 : 1 + below(2), element, terms);
+    void *at = room(STATE, supple_state_size(nodes, element) + remembers, &bytes);
     return supple_state_init(at, bytes, scene, one_in(60) ? NULL : &made);
 }
 
@@ -438,7 +452,8 @@ static supple_status save_and_restore(void) {
     if (supple_displacements(state, &vectors) != SUPPLE_OK) {
         return supple_save(state, end_of(&of_saved, 64), 64);
     }
-    const size_t needed = supple_saved_size(vectors.count);
+    size_t needed = 0;
+    CHECK(supple_state_saved_size(state, &needed) == SUPPLE_OK && needed >= supple_saved_size(vectors.count));
     unsigned char *saved = end_of(&of_saved, needed);
     const supple_status done = supple_save(state, saved, one_in(20) ? below((uint32_t)needed) : needed);
     if (done < 0) {
@@ -1163,14 +1178,15 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16, 1 << 20, 1 << 13, 1 << 14};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 17, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16, 1 << 20, 1 << 13, 1 << 14};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;
     }
     of_removed = arena_of(TETS), of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
-    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 13);
+    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 16);
+    of_prony = arena_of(2 * sizeof(supple_prony));
     of_rest = arena_of(supple_settle_size(NODES) + 64);
     of_places = arena_of(PLACES * sizeof(supple_followed_point)), of_found = arena_of(16 * TETS);
     of_field = arena_of(12 * SIDE * SIDE * SIDE), of_scratch = arena_of(1 << 16);

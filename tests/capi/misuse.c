@@ -141,6 +141,28 @@ static void scenes(void) {
     tissues[1] = tissue;
     DONE(scene_with(bad));
 
+    static supple_prony series[2] = {{{0.3f, 0.0f, 0.2f}, {0.1f, 0.0f, 1.0f}}, {{0.3f, 0.0f, 0.2f}, {0.1f, 0.0f, 1.0f}}};
+    bad.prony = series;
+    DONE(scene_with(bad));
+#define RELAXES(expected, field, wrong, at, most)                                                                      \
+    do {                                                                                                               \
+        const float kept = series[1].field;                                                                            \
+        series[1].field = (wrong);                                                                                     \
+        REFUSED(expected, scene_with(bad));                                                                            \
+        CHECK(error.index == 1 && error.axis == (at) && (float)error.limit == (most));                                 \
+        CHECK((error.value == (double)series[1].field) == ((at) != SUPPLE_NONE && !isnan(series[1].field)));           \
+        series[1].field = kept;                                                                                        \
+    } while (0)
+    RELAXES(SUPPLE_E_RELAXATION_SHARE, share[2], -0.1f, 2, 0.99f);
+    RELAXES(SUPPLE_E_RELAXATION_SHARE, share[0], NAN, 0, 0.99f);
+    RELAXES(SUPPLE_E_RELAXATION_SHARE, share[0], INFINITY, 0, 0.99f);
+    RELAXES(SUPPLE_E_RELAXATION_SHARE, share[0], 0.8f, SUPPLE_NONE, 0.99f);
+    RELAXES(SUPPLE_E_RELAXATION_TIME, seconds[2], 0.0f, 2, 1e-6f);
+    RELAXES(SUPPLE_E_RELAXATION_TIME, seconds[0], 2e6f, 0, 1e6f);
+    RELAXES(SUPPLE_E_RELAXATION_TIME, seconds[2], NAN, 2, 1e-6f);
+    bad.prony = (const supple_prony *)(const void *)((const char *)series + 2);
+    REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+
 #define MESH(expected, place, value)                                                                                   \
     do {                                                                                                               \
         const __typeof__(place) kept = place;                                                                          \
@@ -1135,6 +1157,42 @@ static void pulls(void) {
     DONE(supple_state_reset(state));
 }
 
+/* Learned steps do not know tissue that relaxes: without fallback they are refused, and with it exact ones take their place. */
+static void relaxing_tissue(supple_scene_config config) {
+    const supple_prony series = {{0.5f, 0.0f, 0.0f}, {0.1f, 0.0f, 0.0f}};
+    config.prony = &series;
+    const size_t of_scene = SUPPLE_SCENE_SIZE(NODES, TETS, 1) + SUPPLE_PRONY_SIZE(1), of_learned = SUPPLE_LEARNED_SIZE(NODES, 1);
+    const size_t of_state = SUPPLE_STATE_SIZE(NODES, ELEMENT) + SUPPLE_RELAXATION_SIZE(NODES, TETS, 1, ELEMENT, 1);
+    CHECK(of_scene + of_state + of_learned <= sizeof spare);
+    supple_scene *relaxing;
+    supple_state *remembering;
+    supple_learned *network;
+    supple_learned_facts facts;
+    supple_report report;
+    DONE(supple_scene_init(spare, of_scene, &config, &relaxing, NULL));
+    REFUSED(SUPPLE_E_SHORT, supple_state_init(spare + of_scene, of_state - 1, relaxing, &remembering));
+    DONE(supple_state_init(spare + of_scene, of_state, relaxing, &remembering));
+    REFUSED(SUPPLE_E_NO_RELAXATION, supple_state_stop(relaxing, state));
+    REFUSED(SUPPLE_E_NO_RELAXATION, supple_state_stop(scene, remembering));
+    REFUSED(SUPPLE_E_NO_RELAXATION, supple_state_carry_on(relaxing, state));
+    REFUSED(SUPPLE_E_NO_RELAXATION, supple_set_step(relaxing, state, &length, &error));
+    CHECK(error.value == 0.0 && error.limit > 0.0);
+    for (uint32_t fallback = 0; fallback < 2; fallback++) {
+        const supple_learned_config given = {SUPPLE_CONFIG(supple_learned_config), fallback, 0, weights, sizeof weights};
+        DONE(supple_learned_init(spare + of_scene + of_state, of_learned, relaxing, &given, &network, NULL));
+        DONE(supple_learned_describe(network, &facts));
+        const supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 10.0f, facts.damping};
+        DONE(supple_set_step(relaxing, remembering, &exact, NULL));
+        DONE(supple_state_reset(remembering));
+        DONE(supple_learned_lead(relaxing, NULL, remembering, network, 5 * (double)facts.seconds, NULL, NULL));
+        const supple_status told = supple_learned_step(relaxing, NULL, remembering, network, 1, NULL, &report);
+        note(told);
+        CHECK(told == (fallback ? SUPPLE_FELL_BACK : SUPPLE_E_NO_RELAXATION));
+    }
+    REFUSED(SUPPLE_E_NULL, supple_state_saved_size(NULL, &(size_t){0}));
+    REFUSED(SUPPLE_E_NULL, supple_state_saved_size(remembering, NULL));
+}
+
 static void images(void) {
     static supple_followed_point located[2];
     static float places[2][3] = {{0.01f, 0.01f, 0.01f}, {0.01f, 0.01f, -0.01f}}, moved[2][3], field[3 * 27];
@@ -1246,6 +1304,7 @@ int main(int argc, char **argv) {
     pressures_and_rest();
     contacts();
     pulls();
+    relaxing_tissue(config);
     remarks(config);
     little_work(&config);
     DONE(supple_state_reset(state));

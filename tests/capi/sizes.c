@@ -33,6 +33,12 @@ int main(void) {
             for (uint32_t tissues = 1; tissues < 65536; tissues += 4 * tissues) {
                 CHECK(supple_scene_size(nodes, elements, tissues) == SUPPLE_SCENE_SIZE(nodes, elements, tissues));
                 CHECK(supple_patches_size(nodes, elements, tissues) == SUPPLE_PATCHES_SIZE(nodes, elements, tissues));
+                CHECK(supple_prony_size(tissues) == SUPPLE_PRONY_SIZE(tissues));
+                for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_STRAIN; element++) {
+                    const uint32_t terms = tissues % 4;
+                    CHECK(supple_relaxation_size(nodes, elements, tissues, element, terms) ==
+                          SUPPLE_RELAXATION_SIZE(nodes, elements, tissues, element, terms));
+                }
                 checked++;
             }
         }

@@ -140,7 +140,7 @@ int main(void) {
         size_t most;
     } calls[] = {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
-        {"set_step", set_step, 20},     {"step", exact, 22},               {"learned_init", init_learned, 12},
+        {"set_step", set_step, 20},     {"step", exact, 23},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
         {"guard_init", init_guard, 38},    {"guard_follow", follow, 40},
         {"adaptive_init", init_adaptive, 42}, {"adaptive_advance", advance, 42},

@@ -499,6 +499,37 @@ void pressed_at_rest() {
     EXPECT(is_done(sim.loads().set_pressure({})));
 }
 
+// A cube that relaxes: sizes, a saved state, and the sentences for series that cannot be.
+void relaxes() {
+    const grid cube(3);
+    supple::body body = cube.body();
+    supple::prony series{{0.5f, 0.2f, 0}, {0.01f, 0.1f, 0}};
+    body.prony = {&series, 1};
+    std::vector<supple::line> place(supple::lines(supple::scene::size(64, 162, 1, supple::element::nodal_pressure, true)));
+    const std::size_t room = supple::state::relaxation_size(64, 162, 1, supple::element::nodal_pressure, 2);
+    std::vector<supple::line> of_state(supple::lines(supple::state::size(64) + room));
+    EXPECT(supple::scene::make({place.data(), supple::scene::size(64, 162)}, body).status == status::e_short);
+    const auto scene = supple::scene::make(place, body);
+    EXPECT(scene && supple::state::make({of_state.data(), supple::state::size(64)}, scene.value).status == status::e_short);
+    const auto state = supple::state::make(of_state, scene.value);
+    EXPECT(state && is_done(state.value.set_step(scene.value, 1e-4f, 0)));
+    EXPECT(is_done(state.value.step(scene.value, {}, 3)));
+    const auto bytes = state.value.saved_size();
+    EXPECT(bytes && bytes.value > supple::state::saved_size(64));
+    std::vector<unsigned char> saved(bytes.value);
+    EXPECT(is_done(state.value.save(saved)) && is_done(state.value.restore(saved)));
+    series.share[1] = -0.2f;
+    EXPECT_SENTENCE(supple::scene::make(place, body).error,
+                    "a tissue relaxes by a share that is not positive, or by more than may relax in sum: tissue 0, term 1, -0.2, against 0.99");
+    series.share[1] = 0.2f, series.seconds[0] = 0;
+    EXPECT_SENTENCE(supple::scene::make(place, body).error,
+                    "a tissue relaxes with a time that is not between a microsecond and a million seconds: tissue 0, term 0, 0 s, against 1e-06 s");
+    const supple::tissue two[] = {tissue, tissue};
+    const std::vector<std::uint16_t> of_element(162);
+    body.tissues = two, body.tissue_of_element = of_element;
+    EXPECT(supple::scene::make(place, body).status == status::e_short);
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -533,6 +564,7 @@ int main(int count, char **words) {
     simulated(words[1]);
     changed();
     thin();
+    relaxes();
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;
 }

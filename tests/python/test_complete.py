@@ -27,6 +27,8 @@ ADVANCED = {
     **dict.fromkeys(["supple_large_size", "supple_large_init", "supple_adaptive_size", "supple_adaptive_init"], BY_THE_SIMULATION),
     **dict.fromkeys(["supple_set_step", "supple_step", "supple_learned_step", "supple_large_step", "supple_adaptive_advance"], OWN_STEPS),
     "supple_settle": "supple_sim_settle calls it",
+    "supple_saved_size": "supple_state_saved_size tells it of tissue that relaxes as well",
+    "supple_relaxation_size": BY_THE_SIMULATION,
 }
 
 

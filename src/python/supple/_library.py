@@ -18,6 +18,8 @@ if lib.supple_abi() != lib.SUPPLE_ABI:
     raise ImportError(f"libsupple.so has interface {lib.supple_abi()}, the package is for {lib.SUPPLE_ABI}")
 # Statuses of steps that were refused.
 _DIVERGED = range(lib.SUPPLE_E_DIVERGED_PRESSURE, lib.SUPPLE_E_DIVERGED + 1)
+# Of which an axis is a term.
+_OF_TERMS = (lib.SUPPLE_E_RELAXATION_SHARE, lib.SUPPLE_E_RELAXATION_TIME)
 
 
 def words(status: int) -> str:
@@ -45,7 +47,7 @@ def _refusal(status: int, words: str, error: Any, what: str) -> errors.Error:
         if "node" in found:
             parts.append(f"node {found['node']}")
         if "axis" in found:
-            parts.append(f"axis {'xyz'[found['axis'] % 3]}")
+            parts.append(f"term {found['axis']}" if status in _OF_TERMS else f"axis {'xyz'[found['axis'] % 3]}")
         if not math.isnan(error.value) and (error.value != 0.0 or error.limit != 0.0):
             found["value"] = float(error.value)
             parts.append(f"value {error.value:.6g}")

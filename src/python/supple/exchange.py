@@ -82,9 +82,9 @@ def ablated(simulation: Simulation, elements: ArrayLike, material: Material, sec
     # Of each tissue its ablated part becomes one of its own.
     of_element, parts = scene._tissue_of_element.copy(), np.unique(scene._tissue_of_element[numbers])
     first = len(scene._tissues)
-    tissues = np.concatenate([scene._tissues, scene._tissues[parts]])
+    tissues, prony = (np.concatenate([rows, rows[parts]]) for rows in (scene._tissues, scene._prony))
     of_element[numbers] = first + np.searchsorted(parts, scene._tissue_of_element[numbers])
-    exchanged(simulation, scene._changed(scene._removed, tissues, of_element))
+    exchanged(simulation, scene._changed(scene._removed, tissues, prony, of_element))
     now = simulation.time
     for place in range(first, len(tissues)):
         simulation._ablations.append(Ablation(place, tissues["constants"][place].copy(), end, now, seconds))

@@ -17,6 +17,8 @@ from .mesh import Mesh, boundary_of
 
 # As supple_tissue.
 _TISSUE = np.dtype([("constants", np.float32, 4), ("density", np.float32)])
+# As supple_prony.
+_PRONY = np.dtype([("share", np.float32, 3), ("seconds", np.float32, 3)])
 ELEMENTS = {"linear": lib.SUPPLE_LINEAR, "nodal-pressure": lib.SUPPLE_NODAL_PRESSURE, "nodal-strain": lib.SUPPLE_NODAL_STRAIN}
 
 
@@ -28,9 +30,13 @@ def axes_of(axes: str, what: str) -> int:
 
 
 class Material:
-    """A law with its constants (Pa) and a density (kg/m^3): `Material("neo-hookean", c=1034, d=10000, density=1060)`."""
+    """A law with its constants (Pa) and a density (kg/m^3): `Material("neo-hookean", c=1034, d=10000, density=1060)`.
 
-    def __init__(self, law: str, *, density: float, **constants: float) -> None:
+    With `prony=[[0.5, 1.0], [0.2, 30.0]]` it relaxes: of the stress that changes the shape a share of 0.5 with the time 1 s, 0.2 with 30 s.
+    The constants are those of a motion that is over before anything relaxes; pressure does not relax. At most three terms, 0.99 in sum.
+    """
+
+    def __init__(self, law: str, *, density: float, prony: ArrayLike = (), **constants: float) -> None:
         if law not in LAWS:
             raise InputError(f"law {law!r}: there are {', '.join(LAWS)}")
         self.law, self.density = law, float(density)
@@ -38,17 +44,34 @@ class Material:
         if set(constants) != set(names):
             raise InputError(f"constants of {law}: {', '.join(constants) or 'none'} are given, {', '.join(names)} are needed")
         self.constants = {name: float(constants[name]) for name in names}
+        self.prony = _terms_of(prony)
 
     @classmethod
-    def from_moduli(cls, young: float, poisson: float, *, density: float) -> Material:
+    def from_moduli(cls, young: float, poisson: float, *, density: float, prony: ArrayLike = ()) -> Material:
         """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus."""
         if not -1.0 < poisson < 0.5:
             raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
-        return cls("neo-hookean", c=young / (4.0 * (1.0 + poisson)), d=young / (6.0 * (1.0 - 2.0 * poisson)), density=density)
+        c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))
+        return cls("neo-hookean", c=c, d=d, density=density, prony=prony)
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name}={value:g}" for name, value in self.constants.items())
-        return f"<supple.Material: {self.law}, {constants}, {self.density:g} kg/m^3>"
+        relaxes = f", relaxes by {', '.join(f'{share:g} in {seconds:g} s' for share, seconds in self.prony)}" if self.prony else ""
+        return f"<supple.Material: {self.law}, {constants}, {self.density:g} kg/m^3{relaxes}>"
+
+
+def _terms_of(prony: ArrayLike) -> list[tuple[float, float]]:
+    """Share and time (s) of each term; what they may be the kernel says."""
+    try:
+        terms = np.asarray(prony, np.float64).reshape(-1, 2) if np.size(prony) == 0 else np.asarray(prony, np.float64)
+    except (TypeError, ValueError) as problem:
+        raise InputError(f"prony: not rows of a share and a time (s): {problem}") from None
+    if terms.ndim != 2 or terms.shape[1] != 2 or len(terms) > 3:
+        raise InputError(f"prony: its shape is {terms.shape}, it must be up to three rows of a share and a time (s)")
+    bad = np.flatnonzero(terms[:, 0] == 0.0)
+    if len(bad):
+        raise InputError(f"prony: term {bad[0]} has the share 0, it must be a positive number: leave the term out")
+    return [(float(share), float(seconds)) for share, seconds in terms]
 
 
 class Scene:
@@ -81,7 +104,7 @@ class Scene:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
         self._supports = self._supports_of(fixed, moved, axes)
-        self._law, self._tissues, self._tissue_of_element = self._tissues_of(material)
+        self._law, self._tissues, self._prony, self._tissue_of_element = self._tissues_of(material)
         self._removed = np.zeros(len(mesh.tets), np.uint8)
         self._removed[library.node_numbers(removed, len(mesh.tets), "removed", "element")] = 1
         self._build()
@@ -97,6 +120,9 @@ class Scene:
         made.tissue = library.pointer("supple_tissue", self._tissues)
         if tissues > 1:
             made.tissue_of_element = library.pointer("uint16_t", self._tissue_of_element)
+        relaxes = bool(self._prony["share"].any())
+        if relaxes:
+            made.prony = library.pointer("supple_prony", self._prony)
         if self._removed.any():
             made.removed = library.pointer("uint8_t", self._removed)
         self._config = made
@@ -104,6 +130,8 @@ class Scene:
         size = lib.supple_scene_size(nodes, elements, tissues)
         if self.element == "nodal-strain":
             size += lib.supple_patches_size(nodes, elements, tissues)
+        if relaxes:
+            size += lib.supple_prony_size(tissues)
         memory = library.Memory(size)
         scene, error = ffi.new("supple_scene **"), library.new_error()
         library.checked(lib.supple_scene_init(memory.pointer, size, made, scene, error), error, "the scene")
@@ -111,16 +139,20 @@ class Scene:
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
 
-    def _changed(self, removed: NDArray[np.uint8], tissues: NDArray[np.void], of_element: NDArray[np.uint16]) -> Scene:
+    def _changed(
+        self, removed: NDArray[np.uint8], tissues: NDArray[np.void], prony: NDArray[np.void], of_element: NDArray[np.uint16]
+    ) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)
         made.__dict__.pop("_boundary", None)
-        made._removed, made._tissues, made._tissue_of_element = removed, tissues, of_element
+        made._removed, made._tissues, made._prony, made._tissue_of_element = removed, tissues, prony, of_element
         made._build()
         return made
 
-    def _tissues_of(self, material: Material | Mapping[int, Material]) -> tuple[int, NDArray[np.void], NDArray[np.uint16]]:
-        """The law, the tissues, and of which each element is."""
+    def _tissues_of(
+        self, material: Material | Mapping[int, Material]
+    ) -> tuple[int, NDArray[np.void], NDArray[np.void], NDArray[np.uint16]]:
+        """The law, the tissues, how each relaxes, and of which each element is."""
         regions, of_element = self.mesh.regions, np.zeros(len(self.mesh.tets), np.uint16)
         if isinstance(material, Material):
             materials = [material]
@@ -135,10 +167,12 @@ class Scene:
             of_element = np.searchsorted(known, regions).astype(np.uint16)
             if len({each.law for each in materials}) != 1:
                 raise InputError(f"materials of regions: all must be of one law, not {', '.join(each.law for each in materials)}")
-        rows = np.zeros(len(materials), _TISSUE)
-        for row, each in zip(rows, materials):
+        rows, series = np.zeros(len(materials), _TISSUE), np.zeros(len(materials), _PRONY)
+        for row, relaxing, each in zip(rows, series, materials):
             row["constants"][: len(each.constants)], row["density"] = list(each.constants.values()), each.density
-        return materials[0]._number, rows, of_element
+            for place, (share, seconds) in enumerate(each.prony):
+                relaxing["share"][place], relaxing["seconds"][place] = share, seconds
+        return materials[0]._number, rows, series, of_element
 
     @functools.cached_property
     def _boundary(self) -> NDArray[np.uint32]:

@@ -452,12 +452,12 @@ class Simulation:
         scene = self.scene
         removed = scene._removed.copy()
         removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
-        exchanged(self, scene._changed(removed, scene._tissues, scene._tissue_of_element))
+        exchanged(self, scene._changed(removed, scene._tissues, scene._prony, scene._tissue_of_element))
 
     @_one_at_a_time
     def ablate(self, elements: ArrayLike, material: Material, seconds: float) -> None:
         """Lets the constants of some elements, as numbers or as a mask, change evenly to those of a material of the same law over so many
-        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities stay. See `exchange`."""
+        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities and relaxation stay. See `exchange`."""
         ablated(self, elements, material, seconds)
 
     # Supports.
@@ -669,9 +669,10 @@ class Simulation:
     @_one_at_a_time
     def save(self) -> bytes:
         """The state as bytes, for `restore`."""
-        size = lib.supple_saved_size(len(self.scene.mesh.points))
-        to = np.empty(size, np.uint8)
-        library.checked(lib.supple_save(self._state, library.pointer("uint8_t", to), size))
+        size = ffi.new("size_t *")
+        library.checked(lib.supple_state_saved_size(self._state, size))
+        to = np.empty(size[0], np.uint8)
+        library.checked(lib.supple_save(self._state, library.pointer("uint8_t", to), size[0]))
         return to.tobytes()
 
     @_one_at_a_time
