@@ -299,7 +299,7 @@ impl Relaxing<'_> {
         let tissues = self.tissues::<R>(element);
         for term in 0..terms {
             let [share, at_step, over_step] =
-                [0, 1, 2].map(|number| self.gathered::<R>(&tissues, |of| of.terms[term % MOST_TERMS][number]));
+                [0, 1, 2].map(|number| self.gathered::<R>(&tissues, |of| of.terms[term % MOST_TERMS][number % 3]));
             let driving = share * scale;
             let rows = COMPONENTS * (terms * tile + term);
             let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
