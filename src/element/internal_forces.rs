@@ -172,7 +172,8 @@ fn in_batches<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
 
 /// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
 /// them.
-struct ElementVector<'a, R: Real, K: Past> {
+#[derive(Clone, Copy)]
+struct ElementVector<'a, R> {
     tile: &'a ElementTile,
     first: usize,
     /// Displacement gradient.
@@ -185,26 +186,15 @@ struct ElementVector<'a, R: Real, K: Past> {
     s: R,
     /// Fourth component of the forces.
     fourth: R,
-    /// What the past needs to know of the law.
-    local: K::Local<R>,
 }
 
-impl<R: Real, K: Past> Clone for ElementVector<'_, R, K> {
-    #[inline(always)]
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<R: Real, K: Past> Copy for ElementVector<'_, R, K> {}
-
-impl<'a, R: Real, K: Past> ElementVector<'a, R, K> {
+impl<'a, R: Real> ElementVector<'a, R> {
     #[inline(always)]
     fn zero(tile: &'a ElementTile) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
         let h = [[zero; 3]; 3];
-        Self { tile, first: 0, h, invariants, change: zero, p1: zero, s: zero, fourth: zero, local: K::at_rest() }
+        Self { tile, first: 0, h, invariants, change: zero, p1: zero, s: zero, fourth: zero }
     }
 }
 
@@ -220,7 +210,8 @@ const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 /// that length ([`crate::mesh::strips`]), one element of each strip in every tile.
 ///
 /// A batch of a few vectors of elements goes through three passes: deformation, law, scatter. The law is a long
-/// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]).
+/// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]). Tissue that
+/// remembers has its stress computed in one pass more.
 #[inline(always)]
 pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
     laws: &Laws<'_, L>,
@@ -232,7 +223,8 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usiz
 ) {
     let Some(first) = tiles.first() else { return };
     let (displacement, remainder, pressure) = input;
-    let mut batch = [ElementVector::<R, K>::zero(first); SIZE];
+    let mut batch = [ElementVector::<R>::zero(first); SIZE];
+    let mut kept = [K::at_rest::<R>(); SIZE];
     let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
     let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
     for start in (0..strip_count).step_by(most) {
@@ -241,16 +233,25 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usiz
         R::run_piece(Deform { tiles, length, strips, displacement, remainder, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
-            let locals = respond::<R, L, K>(laws, pair, extremes);
+            let locals = respond::<R, L>(laws, pair, extremes);
             for (elements, local) in pair.iter_mut().zip(&locals).take(count - 2 * index) {
-                visit::<R, L, K>(laws, elements, local, visitor);
+                visit::<R, L>(laws, elements, local, visitor);
+            }
+            for (kept, local) in kept.iter_mut().skip(2 * index).zip(&locals) {
+                *kept = K::of_law(local);
             }
         }
         if K::REMEMBERS {
-            R::run_piece(Relax { batch: batch.get_mut(..count).unwrap_or_default(), past: &mut *past });
+            let batch = batch.get_mut(..count).unwrap_or_default();
+            R::run_piece(Relax { batch, kept: &kept, past: &mut *past });
         }
         let batch = batch.get(..count).unwrap_or_default();
-        R::run_piece(AddForces { batch, length, force: force.reborrow() });
+        let force = force.reborrow();
+        if K::REMEMBERS {
+            R::run_piece(AddForces::<_, true> { batch, length, force });
+        } else {
+            R::run_piece(AddForces::<_, false> { batch, length, force });
+        }
     }
 }
 
@@ -265,7 +266,7 @@ pub(super) fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K])
 }
 
 /// The first pass: deformation of the elements of some strips.
-struct Deform<'a, 'b, R: Real, P: Pressure, K: Past> {
+struct Deform<'a, 'b, R: Real, P: Pressure> {
     tiles: &'a [ElementTile],
     /// Elements of a strip.
     length: usize,
@@ -273,25 +274,25 @@ struct Deform<'a, 'b, R: Real, P: Pressure, K: Past> {
     displacement: Gather<'b>,
     remainder: Gather<'b>,
     pressure: P,
-    batch: &'b mut [ElementVector<'a, R, K>],
+    batch: &'b mut [ElementVector<'a, R>],
 }
 
-impl<R: Real, P: Pressure, K: Past> Piece for Deform<'_, '_, R, P, K> {
+impl<R: Real, P: Pressure> Piece for Deform<'_, '_, R, P> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         match self.length {
-            3 => deform::<R, P, K, 3, 6>(self),
-            2 => deform::<R, P, K, 2, 5>(self),
-            _ => deform::<R, P, K, 1, 4>(self),
+            3 => deform::<R, P, 3, 6>(self),
+            2 => deform::<R, P, 2, 5>(self),
+            _ => deform::<R, P, 1, 4>(self),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes. Elements of tiles with nodes out of range do not deform.
 #[inline(always)]
-fn deform<R: Real, P: Pressure, S: Past, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P, S>) {
+fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P>) {
     let Deform { tiles, strips, displacement, remainder, pressure, batch, .. } = pass;
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
@@ -326,9 +327,9 @@ fn deform<R: Real, P: Pressure, S: Past, const K: usize, const N: usize>(pass: D
 
 /// The second pass: the stress of the law.
 #[inline(always)]
-fn respond<R: Real, L: Law, K: Past>(
+fn respond<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    pair: &mut [ElementVector<'_, R, K>; 2],
+    pair: &mut [ElementVector<'_, R>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [LawState<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
@@ -352,22 +353,21 @@ fn respond<R: Real, L: Law, K: Past>(
 
 /// Calls the visitor.
 #[inline(always)]
-fn visit<R: Real, L: Law, K: Past>(
+fn visit<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    elements: &mut ElementVector<'_, R, K>,
+    elements: &mut ElementVector<'_, R>,
     local: &LawState<R>,
     visitor: &mut impl ElementVisitor,
 ) {
     let law = laws.widen(|lane| elements.tile.element(elements.first + lane));
     let deformation = Deformation::with(elements.h, elements.invariants);
-    let ElementVector { tile, first, .. } = *elements;
-    elements.fourth = visitor.visit::<R, L>(&law, tile, first, &deformation, local);
-    elements.local = K::of_law(local);
+    elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
 }
 
 /// Between the second and the third pass, for tissue that remembers: its stress takes the place of `h`.
 struct Relax<'a, 'b, R: Real, K: Past> {
-    batch: &'a mut [ElementVector<'b, R, K>],
+    batch: &'a mut [ElementVector<'b, R>],
+    kept: &'a [K::Local<R>],
     past: &'a mut K,
 }
 
@@ -376,9 +376,9 @@ impl<R: Real, K: Past> Piece for Relax<'_, '_, R, K> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { batch, past } = self;
-        for elements in batch {
-            let ElementVector { tile, first, p1, s, ref local, .. } = *elements;
+        let Self { batch, kept, past } = self;
+        for (elements, local) in batch.iter_mut().zip(kept) {
+            let ElementVector { tile, first, p1, s, .. } = *elements;
             let deformation = Deformation::with(elements.h, elements.invariants);
             let element = |lane: usize| tile.element(first + lane);
             elements.h = past.stress((tile, first), element, &deformation, [p1, s], local);
@@ -386,13 +386,13 @@ impl<R: Real, K: Past> Piece for Relax<'_, '_, R, K> {
     }
 }
 
-/// Nodal forces from the stress, with the fourth component of the visitor.
+/// Nodal forces from the stress, which is known in place of `h` or that of the law, with the fourth component of the
+/// visitor.
 #[inline(always)]
-fn nodal_forces<R: Real, K: Past>(elements: &ElementVector<'_, R, K>) -> [[R; 4]; 4] {
-    let ElementVector { tile, first, p1, s, .. } = *elements;
-    // The pass before has put it there.
-    let known = elements.h;
-    let stress = if K::REMEMBERS { known } else { Deformation::with(elements.h, elements.invariants).stress(p1, s) };
+fn nodal_forces<R: Real, const KNOWN: bool>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
+    let ElementVector { tile, first, .. } = *elements;
+    let of_law = || Deformation::with(elements.h, elements.invariants).stress(elements.p1, elements.s);
+    let stress = if KNOWN { elements.h } else { of_law() };
     let minus_volume = -tile.volume::<R>(first);
     let mut forces = [[R::splat(0.0); 3]; 4];
     for axis in 0..3 {
@@ -408,31 +408,31 @@ fn nodal_forces<R: Real, K: Past>(elements: &ElementVector<'_, R, K>) -> [[R; 4]
 }
 
 /// The third pass: adds the forces of some strips to their nodes.
-struct AddForces<'a, 'b, R: Real, P: Past> {
-    batch: &'a [ElementVector<'b, R, P>],
+struct AddForces<'a, 'b, R, const KNOWN: bool> {
+    batch: &'a [ElementVector<'b, R>],
     /// Elements of a strip.
     length: usize,
     force: Scatter<'a>,
 }
 
-impl<R: Real, P: Past> Piece for AddForces<'_, '_, R, P> {
+impl<R: Real, const KNOWN: bool> Piece for AddForces<'_, '_, R, KNOWN> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let Self { batch, length, force } = self;
         match length {
-            3 => scatter::<R, P, 3, 6>(batch, force),
-            2 => scatter::<R, P, 2, 5>(batch, force),
-            _ => scatter::<R, P, 1, 4>(batch, force),
+            3 => scatter::<R, KNOWN, 3, 6>(batch, force),
+            2 => scatter::<R, KNOWN, 2, 5>(batch, force),
+            _ => scatter::<R, KNOWN, 1, 4>(batch, force),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn scatter<R: Real, P: Past, const K: usize, const N: usize>(
-    batch: &[ElementVector<'_, R, P>],
+fn scatter<R: Real, const KNOWN: bool, const K: usize, const N: usize>(
+    batch: &[ElementVector<'_, R>],
     mut force: Scatter<'_>,
 ) {
     let mut buffer = ScatterBuffer::NONE;
@@ -441,7 +441,7 @@ fn scatter<R: Real, P: Past, const K: usize, const N: usize>(
         let mut tiles = [strip[0].tile; K];
         unrolled!(element < K => {
             tiles[element] = strip[element].tile;
-            let forces = nodal_forces(&strip[element]);
+            let forces = nodal_forces::<R, KNOWN>(&strip[element]);
             for corner in 0..4 {
                 let row = &mut rows[CORNERS[element % LONGEST][corner] % N];
                 for axis in 0..4 {
