@@ -19,7 +19,7 @@ TURN = np.array([[-0.9396926, -0.3420201, 0.0], [-0.3420201, 0.9396926, 0.0], [0
 def sagged(lobe):
     """The lobe under gravity, moved by up to 21 mm."""
     liver = supple.Material("exponential", a=6000.0, b=8.023, d=160000.0, density=1060.0)
-    simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03), damping=20.0, gravity=GRAVITY)
+    simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03, element="nodal-pressure"), damping=20.0, gravity=GRAVITY)
     simulation.advance(1.0)
     return simulation
 

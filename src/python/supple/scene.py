@@ -83,7 +83,7 @@ class Scene:
     material : of all of it; or of each region of the mesh by its number: `{1: liver, 7: vessel}`
     fixed : nodes that are held, as numbers or as a mask over all nodes
     moved : nodes that will be held where `Simulation.set_motions` says
-    element : "nodal-pressure", "nodal-strain" (bends right on coarse meshes), or "linear" (locks in nearly incompressible tissue)
+    element : "nodal-strain" (nearest to nature on coarse meshes), "nodal-pressure" (stays whole in deep dents of tissue that stiffens), or "linear" (locks in nearly incompressible tissue)
     axes : along which the fixed nodes are held
     removed : elements that are not there, as numbers or as a mask over all, as after a resection: nodes and elements keep their numbers, and
         nodes without an element are held
@@ -96,7 +96,7 @@ class Scene:
         *,
         fixed: ArrayLike = (),
         moved: ArrayLike = (),
-        element: str = "nodal-pressure",
+        element: str = "nodal-strain",
         axes: str = "xyz",
         removed: ArrayLike = (),
     ) -> None:
