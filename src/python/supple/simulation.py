@@ -56,7 +56,7 @@ _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.f
 _MOTION = np.dtype([("node", np.uint32), ("axes", np.uint32), ("metre", np.float32, 3), ("ramp", np.float32)])
 
 
-# Radius of a patch of some 24 nodes, in mean edges.
+# Radius of a patch of some 20 to 50 nodes, in mean edges.
 _PATCH = 2.2
 
 _Given = ParamSpec("_Given")
@@ -376,7 +376,7 @@ class Simulation:
         along: ArrayLike | None = None,
     ) -> Pulls:
         """Draws points of the tissue (m, at rest) to targets (m) from now on, each by the nodes within `radius` (m; 2.2 mean edges unless
-        given, some 24 nodes), with `stiffness` (N/m, one
+        given, some 20 to 50 nodes), with `stiffness` (N/m, one
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
         (three quarters of the shear modulus on a face of the cube of its nodes' volume unless given; more tears the tissue). With `along`, a direction for all or for
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent. A point turns with
