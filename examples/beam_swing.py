@@ -9,31 +9,24 @@ second. Docs: docs/personalisation.md. Needs nothing but Python 3.9.
 """
 
 import argparse
-import csv
 import json
 import pathlib
 import subprocess
 
+from beam import MARKERS, at_end, on_upper_edge, recording, scene
+
 FILMS = {"gravity-a": 0.3, "gravity-b": 0.3, "load-52g-a": 0.58, "load-52g-b": 0.58}  # s that are fitted: two swings
 FITTED = ("gravity-a", "load-52g-a")
 WEIGHT = 0.052015  # kg
-MARKERS = ("top", "left", "right")
 CELLS = (13, 4, 4)
 ELEMENT = "nodal-strain"
-DENSITY, POISSON = 1070.0, 0.499
 REST = 2.0  # s after which the film's end is said to be at rest
 
 
 def film(path):
-    """Times (s), and for each marker its place at the start (m) and its displacement up (m) at these."""
-    with open(path, newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    times = [row["time_s"] for row in rows]
-    markers = {}
-    for marker in MARKERS:
-        x, y, z = (rows[0][f"{marker}_{axis}_m"] for axis in "xyz")
-        markers[marker] = ((x + 0.1, y, z), [row[f"{marker}_z_m"] - z for row in rows])
-    return times, markers
+    """Times (s), and for each marker its place at the start and its displacement up (m) at these."""
+    times, markers = recording(path)
+    return times, {marker: (place, [up for _, _, up in moved]) for marker, (place, moved) in markers.items()}
 
 
 def write_measured(path, times, markers, end):
@@ -42,38 +35,16 @@ def write_measured(path, times, markers, end):
         for time, metre in zip(times, up):
             if 0.0 < time <= end:
                 lines.append(f"{marker},{time:.2f},{x:.6f},{y:.6f},{z:.6f},,,{metre:.6f}")
-        late = [metre for time, metre in zip(times, up) if time >= times[-1] - 0.5]
-        lines.append(f"{marker},{REST},{x:.6f},{y:.6f},{z:.6f},,,{sum(late) / len(late):.6f}")
+        (rest,) = at_end(times, [[metre] for metre in up])
+        lines.append(f"{marker},{REST},{x:.6f},{y:.6f},{z:.6f},,,{rest:.6f}")
     path.write_text("\n".join(lines) + "\n")
 
 
 def write_scene(path, name, young, terms, damping):
-    c, d = young / (4 * (1 + POISSON)), young / (6 * (1 - 2 * POISSON))
     series = ", ".join(f"[{share!r}, {seconds!r}]" for share, seconds in terms)
-    text = f"""gravity = [0.0, 0.0, -9.80709]
-damping = {damping!r}
-[mesh]
-shape = "bar"
-size = [0.1, 0.03, 0.03]
-cells = {list(CELLS)}
-element = "{ELEMENT}"
-[material]
-law = "neo-hookean"
-c = {c!r}
-d = {d!r}
-density = {DENSITY}
-{f"prony = [{series}]" if terms else ""}
-[[fix]]
-plane = {{ axis = "x", at = 0.0 }}
-"""
+    text = f"damping = {damping!r}\n" + scene(ELEMENT, CELLS, young, f"prony = [{series}]\n" if terms else "")
     if name.startswith("load"):
-        # On the upper edge of the free end: each node has half of the way to its neighbours.
-        share, inner, width = WEIGHT / CELLS[1], 0.01 / CELLS[1], 0.03
-        for low, high, kilogram in ((inner, width - inner, share), (0.0, 0.0, share / 2), (width, width, share / 2)):
-            text += f"""[[mass]]
-box = {{ min = [0.1, {low}, 0.03], max = [0.1, {high}, 0.03] }}
-kilogram = {kilogram!r}
-"""
+        text += on_upper_edge(CELLS, WEIGHT, lambda kilogram: ("[[mass]]", f"kilogram = {kilogram!r}"))
     path.write_text(text + f"[time]\nend = {REST}\n")
 
 

@@ -13,32 +13,23 @@ moves across (up to 0.9 mm in one recording, 0.3 mm in the others) no model of a
 """
 
 import argparse
-import csv
 import json
 import pathlib
 import subprocess
 
+from beam import at_end, on_upper_edge, recording, scene
+
 LOADS = {"gravity": ("gravity-a", "gravity-b"), "52g": ("load-52g-a", "load-52g-b")}
 WEIGHT = 0.51012  # N
-MARKERS = ("top", "left", "right")
 # Cells along, across and up.
 MESHES = {"1,248": (13, 4, 4), "4,320": (20, 6, 6)}
-POISSON = 0.499
 START = 100e3  # Pa
 
 
 def at_rest(path):
     """Place at the start and displacement at rest (m) of each marker."""
-    with open(path, newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    end = [row for row in rows if row["time_s"] >= rows[-1]["time_s"] - 0.5]
-    found = {}
-    for marker in MARKERS:
-        columns = [f"{marker}_{axis}_m" for axis in "xyz"]
-        place = [rows[0][column] for column in columns]
-        moved = [sum(row[column] for row in end) / len(end) - start for column, start in zip(columns, place)]
-        found[marker] = ([place[0] + 0.1, *place[1:]], moved)
-    return found
+    times, markers = recording(path)
+    return {marker: (place, at_end(times, moved)) for marker, (place, moved) in markers.items()}
 
 
 def write_points(path, data, recordings):
@@ -51,33 +42,9 @@ def write_points(path, data, recordings):
 
 
 def write_scene(path, element, cells, load):
-    c, d = START / (4 * (1 + POISSON)), START / (6 * (1 - 2 * POISSON))
-    text = f"""gravity = [0.0, 0.0, -9.80709]
-[mesh]
-shape = "bar"
-size = [0.1, 0.03, 0.03]
-cells = {list(cells)}
-element = "{element}"
-[material]
-law = "neo-hookean"
-c = {c}
-d = {d}
-density = 1070.0
-[[fix]]
-plane = {{ axis = "x", at = 0.0 }}
-"""
+    text = scene(element, cells, START)
     if load == "52g":
-        # From the upper edge of the free end: each node has half of the way to its neighbours.
-        share, inner, width = -WEIGHT / cells[1], 0.01 / cells[1], 0.03
-        text += f"""[[force]]
-box = {{ min = [0.1, {inner}, 0.03], max = [0.1, {width - inner}, 0.03] }}
-newton = [0.0, 0.0, {share}]
-"""
-        for side in (0.0, width):
-            text += f"""[[force]]
-box = {{ min = [0.1, {side}, 0.03], max = [0.1, {side}, 0.03] }}
-newton = [0.0, 0.0, {share / 2}]
-"""
+        text += on_upper_edge(cells, -WEIGHT, lambda newton: ("[[force]]", f"newton = [0.0, 0.0, {newton}]"))
     path.write_text(text + "[time]\nend = 1.0\n")
 
 
