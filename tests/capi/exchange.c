@@ -7,7 +7,7 @@
 
 /* A coarse bar takes longer to rest. */
 enum { ROOM = PARTS == 1 ? 6 << 20 : 32 << 20, FRAMES = PARTS == 1 ? 400 : 150 };
-static const double FRAME = 0.02; /* s */
+#include "simulated.h"
 
 SUPPLE_MEMORY(first_memory, ROOM);
 SUPPLE_MEMORY(second_memory, ROOM);
@@ -15,7 +15,6 @@ SUPPLE_MEMORY(third_memory, ROOM);
 SUPPLE_MEMORY(contact_memory, 1 << 20);
 SUPPLE_MEMORY(pulls_memory, 1 << 10);
 static uint8_t removed[TETS];
-static supple_scene_config body;
 static float of_one[NODES][3], of_other[NODES][3], frozen[NODES][3];
 
 /* Of all bytes of an object. Those between its fields have no values of their own, but stay what they are. */
@@ -33,27 +32,6 @@ static supple_settings settings_of(uint32_t steps) {
     made.steps = steps, made.damping = 20.0f, made.forces = FORCES, made.motions = MOTIONS, made.guard = 0;
     made.surface.node_count = NODES, made.grips = NODES;
     return made;
-}
-
-static supple_sim *set_up(unsigned char *memory, const supple_settings *settings) {
-    size_t bytes;
-    supple_sim *sim;
-    supple_error error;
-    CHECK(supple_sim_size(&body, settings, &bytes, NULL) == SUPPLE_OK && bytes <= ROOM);
-    const supple_status status = supple_sim_setup(memory, bytes, &body, settings, &sim, &error);
-    if (status != SUPPLE_OK) fprintf(stderr, "%s\n", supple_status_text(status));
-    CHECK(status == SUPPLE_OK);
-    return sim;
-}
-
-static supple_sim_objects objects_of(supple_sim *sim) {
-    supple_sim_objects objects;
-    CHECK(supple_sim_describe(sim, &objects) == SUPPLE_OK);
-    return objects;
-}
-
-static void advance(supple_sim *sim, int frames) {
-    for (int frame = 0; frame < frames; frame++) CHECK(supple_sim_advance(sim, FRAME, NULL, NULL) >= SUPPLE_OK);
 }
 
 static void set_gravity(supple_sim *sim) {

@@ -3,7 +3,7 @@
 #include "body.h"
 
 enum { ROOM = PARTS == 1 ? 8 << 20 : 48 << 20, TERMS = 2 };
-static const double FRAME = 0.02; /* s */
+#include "simulated.h"
 #define STATE_SIZE (SUPPLE_STATE_SIZE(NODES, ELEMENT) + SUPPLE_RELAXATION_SIZE(NODES, TETS, 1, ELEMENT, TERMS))
 
 SUPPLE_MEMORY(scene_memory, SCENE_SIZE + SUPPLE_PRONY_SIZE(1));
@@ -17,7 +17,6 @@ SUPPLE_MEMORY(settle_memory, SUPPLE_SETTLE_SIZE(NODES));
 static unsigned char saved[1 + 144 + 48 * NODES + 16 + STATE_SIZE / 2], again[sizeof saved];
 static float moved[NODES][3], forces[NODES][3];
 static uint8_t removed[TETS];
-static supple_scene_config body;
 
 /* Shares and times (s) of the terms. The second one stands behind a place without one. */
 static const supple_prony series = {{0.5f, 0.0f, 0.2f}, {0.01f, 0.0f, 0.1f}}, none = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
@@ -73,24 +72,6 @@ static supple_settings settings_of(uint32_t steps) {
     made.steps = steps, made.damping = 20.0f, made.forces = 1, made.motions = MOTIONS;
     if (steps == SUPPLE_STEPS_EXACT) made.seconds = 1e-4f;
     return made;
-}
-
-static supple_sim *set_up(unsigned char *memory, const supple_settings *settings) {
-    size_t bytes;
-    supple_sim *sim;
-    CHECK(supple_sim_size(&body, settings, &bytes, NULL) == SUPPLE_OK && bytes <= ROOM);
-    CHECK(supple_sim_setup(memory, bytes, &body, settings, &sim, NULL) == SUPPLE_OK);
-    return sim;
-}
-
-static supple_sim_objects objects_of(supple_sim *sim) {
-    supple_sim_objects objects;
-    CHECK(supple_sim_describe(sim, &objects) == SUPPLE_OK);
-    return objects;
-}
-
-static void advance(supple_sim *sim, int frames) {
-    for (int frame = 0; frame < frames; frame++) CHECK(supple_sim_advance(sim, FRAME, NULL, NULL) >= SUPPLE_OK);
 }
 
 /* A pull along y, which the middle of the bar follows. */
