@@ -1759,14 +1759,6 @@ const char *supple_version(void);
 const char *supple_status_text(int32_t status);
 
 /**
- * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
- * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
- */
-size_t supple_scene_size(uint32_t nodes,
-                         uint32_t elements,
-                         uint32_t tissues);
-
-/**
  * Bytes of memory that a scene with tissue that relaxes needs more than supple_scene_size. SUPPLE_PRONY_SIZE is the same
  * as a constant.
  */
@@ -1784,6 +1776,14 @@ size_t supple_relaxation_size(uint32_t nodes,
                               uint32_t tissues,
                               uint32_t element,
                               uint32_t terms);
+
+/**
+ * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+ * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
+ */
+size_t supple_scene_size(uint32_t nodes,
+                         uint32_t elements,
+                         uint32_t tissues);
 
 /**
  * Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any

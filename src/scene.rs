@@ -7,16 +7,16 @@
 
 mod build_error;
 mod constants;
+mod memory;
 mod owned;
 
 use core::ops::{Deref, Range};
 
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
-    Remembered, Series, VECTORS_OF_TERM, VolumeRows, element_energy, element_fields, patch_energy, patch_tiles_for,
-    stabilising_energy,
+    Remembered, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
-use crate::material::{Element, Law, Laws, Material, Moduli, Prony};
+use crate::material::{Element, Law, Laws, Material, Moduli};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
@@ -24,6 +24,8 @@ use crate::simd::{NodeVector, TILE};
 
 pub use crate::element::{Axes, patch_rows_for};
 pub use build_error::BuildError;
+pub use memory::memory_vectors_for;
+use memory::terms_of;
 pub use owned::{FixedScene, FixedTables, Scene, SceneTables};
 #[cfg(any(feature = "std", test))]
 pub use owned::{VecScene, VecTables};
@@ -61,34 +63,12 @@ pub const fn tiles_for(elements: usize) -> usize {
     most_tiles(elements)
 }
 
-/// No fewer than [`SceneView::memory_vectors`] of any scene of so many nodes, elements and tissues, none of which
-/// relaxes with more `terms`.
-#[must_use]
-pub const fn memory_vectors_for(
-    element: Element,
-    nodes: usize,
-    elements: usize,
-    tissues: usize,
-    terms: usize,
-) -> usize {
-    let tiles = match element {
-        Element::NodalStrain => patch_tiles_for(nodes, elements, tissues),
-        _ => tiles_for(elements),
-    };
-    tiles.saturating_mul(2 * VECTORS_OF_TERM).saturating_mul(terms)
-}
-
 /// How many tissues the elements of a material may be of.
 pub(crate) fn tissue_count(material: &impl Material) -> usize {
     match material.laws() {
         Laws::One(_) => 1,
         Laws::Regions { tissues, .. } => tissues.len(),
     }
-}
-
-/// Terms of the tissue that relaxes with most.
-fn terms_of(material: &impl Material) -> usize {
-    material.prony().iter().map(Prony::terms).max().unwrap_or(0)
 }
 
 /// CRC32 of all tables, to tell scenes of the same size apart.
@@ -262,12 +242,6 @@ impl SceneFacts {
     #[must_use]
     pub fn tile_count(&self) -> usize {
         self.partitions.tiles()
-    }
-
-    /// Terms of the tissue that relaxes with most.
-    #[cfg(feature = "capi-neo-hookean")]
-    pub(crate) const fn terms(&self) -> usize {
-        self.terms
     }
 
     /// Rows of patches in use, for nodal strain.
@@ -499,54 +473,6 @@ impl<'a, M: Material> SceneView<'a, M> {
     /// What internal forces are computed from.
     pub(crate) fn elements(&self) -> Elements<'a, M::Law> {
         Elements { laws: self.material.laws(), tiles: self.tiles, partitions: &self.facts.partitions }
-    }
-
-    /// Tiles of what relaxes: elements, or with nodal strain patches.
-    pub(crate) fn relaxing_tiles(&self) -> usize {
-        if self.element().is_nodal_strain() { self.patches.tiles().len() } else { self.tiles.len() }
-    }
-
-    /// The same of the elements or patches whose first partition is one of these.
-    pub(crate) fn relaxing_tiles_of(&self, partitions: &Range<usize>) -> Range<usize> {
-        let patches = self.element().is_nodal_strain();
-        if patches { self.patches.tiles_of(partitions) } else { self.facts.partitions.tiles_of(partitions) }
-    }
-
-    /// Vectors of the memory of a tile, one copy.
-    pub(crate) fn vectors_of_tile(&self) -> usize {
-        // Without a look at the facts where no tissue can relax: its kernels are then left out.
-        if self.material.prony().is_empty() { 0 } else { VECTORS_OF_TERM * self.facts.terms }
-    }
-
-    /// Vectors that a state keeps for tissue that relaxes ([`StateView::remembering`](crate::state::StateView::remembering)).
-    #[must_use]
-    pub fn memory_vectors(&self) -> usize {
-        2 * self.relaxing_tiles() * self.vectors_of_tile()
-    }
-
-    /// A checksum of what relaxes, in its order: memory of a state stays where it is in a scene with the same.
-    #[cfg(feature = "capi-neo-hookean")]
-    pub(crate) fn memory_checksum(&self) -> u32 {
-        let mut hasher = crc32fast::Hasher::new();
-        if self.memory_vectors() > 0 {
-            match self.element().is_nodal_strain() {
-                true => self.patches.tiles().iter().for_each(|tile| hasher.update(bytemuck::bytes_of(tile))),
-                false => hasher.update(bytemuck::must_cast_slice(self.tiles)),
-            }
-        }
-        hasher.finalize()
-    }
-
-    /// How tissue relaxes from the middle of the last step to that of the next, in step `step`; nothing if none does.
-    pub(crate) fn series(&self, halves: [f32; 2], step: u64) -> Option<Series<'a>> {
-        if self.vectors_of_tile() == 0 {
-            return None;
-        }
-        let of_element = match self.material.laws() {
-            Laws::One(_) => &[],
-            Laws::Regions { of_element, .. } => of_element,
-        };
-        Some(Series { tissues: self.material.prony(), of_element, terms: self.facts.terms, halves, step })
     }
 
     /// Fields of every element, in the order of the tables, under the given displacements (m).

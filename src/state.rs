@@ -315,14 +315,19 @@ impl<'a> StateView<'a> {
         copies_of(self.memory, self.progress)
     }
 
+    /// What tissue remembers.
+    pub(crate) const fn remembered(&self) -> &[NodeVector] {
+        remembered(self.memory, self.progress)
+    }
+
     /// Copies the vectors that a step moves to [`MOVED_VECTORS`] for each of so many nodes, and what tissue remembers.
-    pub(crate) fn save(&mut self, nodes: usize, into: &mut [NodeVector]) {
-        let (moved, remembered) = into.split_at_mut((MOVED_VECTORS * nodes).min(into.len()));
+    pub(crate) fn save(&self, nodes: usize, into: &mut [NodeVector]) {
+        let (moved, past) = into.split_at_mut((MOVED_VECTORS * nodes).min(into.len()));
         let vectors = [&*self.displacement, self.remainder, self.increment];
         for (saved, vectors) in moved.chunks_exact_mut(nodes.max(1)).zip(vectors) {
             copy(saved, vectors);
         }
-        copy(remembered, self.copies_of_memory()[0]);
+        copy(past, self.remembered());
     }
 
     /// Copies them back.
@@ -349,6 +354,12 @@ impl<'a> StateView<'a> {
 pub(crate) fn copies_of<'a>(memory: &'a mut [NodeVector], progress: &Progress) -> [&'a mut [NodeVector]; 2] {
     let (first, second) = memory.split_at_mut(memory.len() / 2);
     if progress.second { [second, first] } else { [first, second] }
+}
+
+/// The first of [`copies_of`].
+pub(crate) const fn remembered<'a>(memory: &'a [NodeVector], progress: &Progress) -> &'a [NodeVector] {
+    let (first, second) = memory.split_at(memory.len() / 2);
+    if progress.second { second } else { first }
 }
 
 /// What can be seen as a state.

@@ -137,7 +137,7 @@ pub unsafe extern "C" fn supple_sim_carry_on(
         }
         same_points(points_of(sim), points_of(from))?;
         let (open, former) = (OpenScene::of(new.scene)?, OpenScene::of(old.scene)?);
-        let (mut to, mut before) = (opened_of(&open, new.state)?, opened_of(&former, old.state)?);
+        let (mut to, before) = (opened_of(&open, new.state)?, opened_of(&former, old.state)?);
         can_take_over(new.loads, old.loads, &open)?;
         // The last that may be refused.
         take_over_instruments(&new, &old)?;
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn supple_sim_carry_on(
         copy(to.remainder, before.remainder);
         copy(to.increment, before.increment);
         copy(from_mut(to.progress), from_ref(before.progress));
-        let [remembered, _] = before.copies_of_memory();
+        let remembered = before.remembered();
         let [now, room] = to.copies_of_memory();
         carry((former.view(), remembered), (open.view(), now), room);
         tled::carry_on_in(open.view(), to);

@@ -18,6 +18,7 @@ use super::guard::*;
 use super::large::*;
 use super::learned::*;
 use super::loads::*;
+use super::prony::*;
 use super::saved::*;
 use super::scene::*;
 use super::state::*;

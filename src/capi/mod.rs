@@ -20,6 +20,8 @@ mod status;
 
 mod memory;
 
+mod prony;
+
 mod scene;
 
 mod loads;

@@ -26,9 +26,10 @@ use super::learned::{
 };
 use super::loads::{CallLoads, supple_loads, supple_loads_init, supple_loads_size, supple_set_contact};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
+use super::prony::{series_of, supple_prony_size, supple_relaxation_size};
 use super::scene::{
-    OpenScene, check_choice, series_of, supple_patches_size, supple_prony_size, supple_relaxation_size, supple_scene,
-    supple_scene_config, supple_scene_init, supple_scene_size,
+    OpenScene, check_choice, supple_patches_size, supple_scene, supple_scene_config, supple_scene_init,
+    supple_scene_size,
 };
 use super::state::{critical_step, opened_of, supple_state, supple_state_init, supple_state_size};
 use super::status::{Answer, short, status_of, supple_error, supple_status};

@@ -397,8 +397,8 @@ fn start_from(state: &StateView<'_>, second: &mut StateView<'_>) {
     copy(second.displacement, state.displacement);
     copy(second.remainder, state.remainder);
     copy(second.increment, state.increment);
-    copy(second.memory, state.memory);
     set(second.progress, state.progress);
+    copy(second.copies_of_memory()[0], state.remembered());
 }
 
 /// Not inlined: of what two structures borrow the compiler forgets that it does not overlap, and asks the host for

@@ -515,7 +515,7 @@ fn write_closeness<M: ElementMaterial>(
         table.fill(NodeVector::ZERO);
     }
     nodal_volumes(scene, scratch, &[], volume, &CallingThread);
-    internal_forces(scene, all, [scratch, &[]], volume, rough_before, ScalarBound);
+    internal_forces(scene, all, [scratch, &[]], volume, rough_before, ScalarBound, None);
     for (rank, next) in next_increment.iter_mut().enumerate() {
         let node = node_at(places, rank);
         let bound = rough_before.get(node).map_or(0.0, |force| force.0[3]);

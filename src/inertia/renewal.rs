@@ -203,7 +203,7 @@ impl Renewal {
         let NodeTables { next_increment, scratch, .. } = tables;
         scratch.fill(NodeVector::ZERO);
         let all = scene.elements().partitions.all();
-        internal_forces(scene, all, [displacement, &[]], volume, scratch, ScalarBound);
+        internal_forces(scene, all, [displacement, &[]], volume, scratch, ScalarBound, None);
         let Matrices { inertia: of_cells, bounds, .. } = matrices;
         of_cells.fill([[0.0; 4]; _]);
         let (mut sums, factor) = ([[0.0f32; 2]; MAX_POINTS], 1.0 + scaling.k);

@@ -106,7 +106,7 @@ impl<M: ElementMaterial> RestCheck<'_, '_, M> {
         nodal_volumes(scene, self.displacement, &[], self.volume, &CallingThread);
         self.force.fill(NodeVector::ZERO);
         let all = scene.elements().partitions.all();
-        internal_forces(scene, all, [self.displacement, &[]], self.volume, self.force, ScalarBound);
+        internal_forces(scene, all, [self.displacement, &[]], self.volume, self.force, ScalarBound, None);
         forces.fill(NodeVector::ZERO);
         for (node, force) in self.force.iter().enumerate() {
             if let (Some(place), Some(inertia)) = (places.get(rank_of(places, node)), scene.inertia.get(node)) {

@@ -59,8 +59,7 @@ impl Simulation<'_> {
                 let undo = |simulation: &mut Self| {
                     let _ = simulation.scene.set_constants(former);
                 };
-                let remembered = self.state.view().copies_of_memory()[0].to_vec();
-                return self.go_on([remembered.clone(), remembered].concat(), undo);
+                return self.go_on(None, undo);
             }
         }
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?.without(&all)?;
@@ -68,7 +67,7 @@ impl Simulation<'_> {
         let needed = scene.view().memory_vectors();
         let mut remembered = vec![NodeVector::ZERO; needed];
         let (now, room) = remembered.split_at_mut(needed / 2);
-        carry((self.scene.view(), self.state.view().copies_of_memory()[0]), (scene.view(), now), room);
+        carry((self.scene.view(), self.state.view().remembered()), (scene.view(), now), room);
         let former = core::mem::replace(&mut self.scene, scene);
         let removed = core::mem::replace(&mut self.changes.removed, all);
         let touchable = self.touchable.clone();
@@ -78,7 +77,7 @@ impl Simulation<'_> {
             (simulation.pulled, simulation.pulls) = (pulled, pulls);
             (simulation.changes.removed, simulation.changes.meets_boundary) = (removed, is_boundary);
         };
-        self.go_on(remembered, undo)
+        self.go_on(Some(remembered), undo)
     }
 
     /// Removes elements, as a resection does: see [`Simulation::exchange`].
@@ -198,10 +197,17 @@ impl Simulation<'_> {
         Ok(all)
     }
 
-    /// Goes on in the scene that there is now, or undoes what has led to it.
-    fn go_on(&mut self, remembered: Vec<NodeVector>, undo: impl FnOnce(&mut Self)) -> Result<(), SimulationError> {
+    /// Goes on in the scene that there is now, with what its tissue remembers where other tables have taken the place of
+    /// the former ones, or undoes what has led to it.
+    fn go_on(
+        &mut self,
+        remembered: Option<Vec<NodeVector>>,
+        undo: impl FnOnce(&mut Self),
+    ) -> Result<(), SimulationError> {
         let (state, prepared) = (self.state.clone(), self.prepared.take());
-        self.state.remember(remembered);
+        if let Some(remembered) = remembered {
+            self.state.remember(remembered);
+        }
         let was_prepared = prepared.is_some();
         let answer = self.go_on_prepared(was_prepared);
         if answer.is_err() {

@@ -38,7 +38,7 @@ use crate::element::{ElementMaterial, NodeInertia, mark_moment};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{Progress, StateView, copies_of};
+use crate::state::{Progress, StateView, remembered};
 use energy_sums::Entry;
 
 /// A step that is being computed: nothing has moved yet.
@@ -209,9 +209,9 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoPulls });
         }
-        let remembered = self.scene.memory_vectors();
-        if remembered > 0 {
-            if !C::RELAXES || self.memory.len() < remembered {
+        let needed = self.scene.memory_vectors();
+        if needed > 0 {
+            if !C::RELAXES || self.memory.len() < needed {
                 let time = self.progress.time;
                 return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoRelaxation });
             }
@@ -270,13 +270,11 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// The balance after this step's part of the measurement of the energy.
-    fn measured<C: StepMethod<M>>(&mut self, balance: EnergyBalance, method: &C) -> EnergyBalance {
-        let remembered = self.memory.get_mut(..self.scene.memory_vectors()).unwrap_or_default();
-        let memory = &*copies_of(remembered, self.progress)[0];
-        let Self { scene, displacement, volume, .. } = self;
+    fn measured<C: StepMethod<M>>(&self, balance: EnergyBalance, method: &C) -> EnergyBalance {
+        let Self { scene, displacement, volume, memory, progress, .. } = self;
         let (all, first) = (scene.energy_places(), balance.cycle.next as usize);
         let next = (first + all.div_ceil(C::ENERGY_CYCLE)).min(all);
-        let strain = scene.strain_energy_at(first..next, displacement, volume, memory);
+        let strain = scene.strain_energy_at(first..next, displacement, volume, remembered(memory, progress));
         let next = if next < all { Some(next as u32) } else { None };
         balance.measured(strain, next, method.added_inertia().into(), scene.rounding_energy())
     }

@@ -45,8 +45,7 @@ impl<M: Material> Trial<'_, M> {
         let Self { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = self;
         let (scene, is_heated) = (*scene, *is_heated);
         let series = scene.series(self.halves, progress.steps);
-        let remembered = self.memory.get_mut(..scene.memory_vectors()).unwrap_or_default();
-        let [before, after] = copies_of(remembered, progress);
+        let [before, after] = copies_of(self.memory, progress);
         let forcing =
             Forcing { scene, visitor, displacement, remainder, is_heated, loads, progress, series, before, look_cycle };
         TotalForces { forcing, increment, volume, force, after }
@@ -179,7 +178,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
             pressure.add_forces(self.progress.time, self.displacement, nodes.start, force);
         }
         let past = self.series.map(|series| (series, self.before, &mut **after, *own));
-        *extremes = forces_with_past(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor, past);
+        *extremes = internal_forces(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor, past);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -264,19 +263,9 @@ fn crushed_forces<M: ElementMaterial>(
 type PastOfPart<'a> = (Series<'a>, &'a [NodeVector], &'a mut [NodeVector], usize);
 
 /// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the
-/// [`nodal_volumes`] where the material needs them, or the marks of crushed elements: of tissue that has not relaxed.
+/// [`nodal_volumes`] where the material needs them, or the marks of crushed elements; without a past
+/// of tissue that has not relaxed.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
-    scene: SceneView<'_, M>,
-    partitions: Range<usize>,
-    moved: [&[NodeVector]; 2],
-    volumes: &[NodeVector],
-    force: &mut [NodeVector],
-    visitor: V,
-) -> Extremes<f32> {
-    forces_with_past(scene, partitions, moved, volumes, force, visitor, None)
-}
-
-fn forces_with_past<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
     moved: [&[NodeVector]; 2],

@@ -43,7 +43,7 @@ use crate::loads::Loads;
 use crate::material::Material;
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
-use crate::state::{AsState, StateView, copies_of};
+use crate::state::{AsState, StateView};
 use crate::step::pulls::MOST_WAY;
 use crate::step::{
     self, CallingThread, Cause, Computed, EnergyBalance, Moving, Status, Step, StepMethod, Threads, TotalForces,
@@ -215,9 +215,7 @@ fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateVie
         return None;
     }
     nodal_volumes(scene, state.displacement, &[], state.volume, &CallingThread);
-    let remembered = scene.memory_vectors();
-    let memory = &*copies_of(state.memory.get_mut(..remembered).unwrap_or_default(), state.progress)[0];
-    Some(scene.strain_energy(state.displacement, state.volume, memory))
+    Some(scene.strain_energy(state.displacement, state.volume, state.remembered()))
 }
 
 /// Forces with which the elements act on the nodes at the state's displacements, N ([`crate::state::State::forces`],
@@ -236,6 +234,14 @@ fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     let force = force.get_mut(..nodes).unwrap_or_default();
     write_volumes(scene, displacement, volume, &CallingThread);
     force.fill(NodeVector::ZERO);
-    step::internal_forces(scene, scene.elements().partitions.all(), [displacement, &[]], volume, force, NoVisitor);
+    step::internal_forces(
+        scene,
+        scene.elements().partitions.all(),
+        [displacement, &[]],
+        volume,
+        force,
+        NoVisitor,
+        None,
+    );
     true
 }

@@ -3,7 +3,8 @@
 
 use std::sync::atomic::AtomicUsize;
 
-use supple::inertia::{self, Cells};
+use supple::guard::{EVERY, Guard};
+use supple::inertia::{self, Cells, LargeStep};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{AnyLaw, Element, NeoHookean, Prony, PronyError, TissueValues, VecMaterial};
 use supple::scene::{Support, VecScene};
@@ -99,7 +100,41 @@ fn every_number_of_threads_gives_the_same_bits() {
     }
 }
 
-/// Of its own vector loops a state without room knows nothing.
+/// Memory may be longer than a scene needs: a guard, which copies it, estimates the same.
+#[test]
+fn longer_memory_changes_no_bit() {
+    for element in ELEMENTS {
+        let body = Body::irregular([0.03, 0.03, 0.06], [3, 3, 6]);
+        let scene = VecScene::build(material(element, NEO, &TERMS), &body.mesh(), &held(&body)).unwrap();
+        let needed = scene.view().memory_vectors();
+        let critical = bound(&scene, &VecState::of(scene.view()));
+        let (exact, long) = (Step::new(0.5 * critical.seconds, 5.0, critical).unwrap(), 10.0 * critical.seconds);
+        let long = Step::unchecked(long, 5.0).unwrap();
+        let loads = Loads::new(&scene, GRAVITY, &[], &[]).unwrap();
+        let of = |vectors: usize| {
+            let mut state = VecState::at_rest(scene.node_count());
+            let mut memory = vec![NodeVector::ZERO; vectors];
+            // An odd number: the second copy is that of now.
+            for _ in 0..301 {
+                let mut view = state.view().remembering(&mut memory);
+                assert_eq!(tled::step(&scene, &loads, &mut view, &exact), Status::Ok);
+            }
+            let mut view = state.view().remembering(&mut memory);
+            let method = inertia::Method::new(Cells::Suggested);
+            let points = &body.points;
+            let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, view.reborrow(), long).unwrap();
+            let mut guard = Guard::prepare_in_vec(scene.view(), points, view.reborrow(), long, EVERY).unwrap();
+            for _ in 0..12 {
+                let status = large.step(scene.view(), &loads, view.reborrow());
+                assert!(guard.follow(status, scene.view(), &loads, view.reborrow()).is_taken());
+            }
+            (bits(&state), guard.estimate().unwrap().mean.to_bits())
+        };
+        assert_eq!(of(needed), of(needed + 2 * 24), "{element:?}");
+    }
+}
+
+/// What it has no room for a state cannot remember.
 #[test]
 fn a_state_without_room_is_refused_in_words() {
     let body = Body::bar([0.03, 0.03, 0.06], [2, 2, 4]);
