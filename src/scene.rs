@@ -7,13 +7,16 @@
 
 mod build_error;
 mod constants;
+mod fibres;
 mod memory;
 mod owned;
 
 use core::ops::{Deref, Range};
 
+use glam::{DMat3, DVec3};
+
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
+    ElementFields, ElementMaterial, ElementTile, Elements, FibreTangent, FibreTile, MOST_ELEMENTS, MoreEnergy, NodeInertia, PatchBuilder, PatchRow, Patches,
     Remembered, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli};
@@ -24,6 +27,8 @@ use crate::simd::{NodeVector, TILE};
 
 pub use crate::element::{Axes, patch_rows_for};
 pub use build_error::BuildError;
+pub use fibres::fibre_tiles_for;
+use fibres::{check_directions, directions_of, families_of, write_directions};
 pub use memory::memory_vectors_for;
 use memory::terms_of;
 pub use owned::{FixedScene, FixedTables, Scene, SceneTables};
@@ -94,6 +99,8 @@ pub struct SceneFacts {
     has_point_masses: bool,
     /// Terms of the tissue that relaxes with most.
     terms: usize,
+    /// Families of directions that the fibres of the tissues need.
+    families: usize,
 }
 
 impl SceneFacts {
@@ -108,11 +115,12 @@ impl SceneFacts {
         checksum: 0,
         has_point_masses: false,
         terms: 0,
+        families: 0,
     };
 
-    /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]) and for nodal strain `patches`
-    /// ([`patch_rows_for`]; none otherwise), from a mesh, what it is made of, and its supports; a node may be listed
-    /// more than once. Allocates nothing.
+    /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]), for nodal strain `patches`
+    /// ([`patch_rows_for`]; none otherwise) and for tissue with fibres `fibres` ([`fibre_tiles_for`]), from a mesh, what it
+    /// is made of, and its supports; a node may be listed more than once. Allocates nothing.
     pub fn build<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
@@ -120,10 +128,13 @@ impl SceneFacts {
         nodes: &mut [NodeInertia],
         tiles: &mut [ElementTile],
         patches: &mut [PatchRow],
+        fibres: &mut [FibreTile],
     ) -> Result<Self, BuildError> {
         let mut facts = Self::without_patches(material, mesh, supports, nodes, tiles)?;
         if material.element().is_nodal_strain() {
-            facts.build_patches(material, tiles, patches)?;
+            facts.build_patches(material, tiles, patches, fibres)?;
+        } else if facts.families > 0 {
+            write_directions(material, tiles.get(..facts.tile_count()).unwrap_or_default(), fibres)?;
         }
         Ok(facts)
     }
@@ -133,7 +144,9 @@ impl SceneFacts {
         material: &impl Material,
         tiles: &[ElementTile],
         rows: &mut [PatchRow],
+        fibres: &mut [FibreTile],
     ) -> Result<(), BuildError> {
+        let families = self.families;
         let builder = PatchBuilder {
             nodes: self.node_count,
             elements: self.element_count,
@@ -141,10 +154,14 @@ impl SceneFacts {
             partitions: &self.partitions,
             tissues: tissue_count(material),
             region: |element| material.region(element),
+            directions: |element| directions_of(material, families, element),
         };
-        let built = builder.build(rows);
+        let capacity = fibres.len();
+        let fibres = if families > 0 { fibres } else { &mut [] };
+        let built = builder.build(rows, fibres);
         self.patch_rows = built.map_err(|needed| BuildError::PatchCapacity { needed, capacity: rows.len() })?;
-        Ok(())
+        let needed = Patches::of(rows).tiles().len();
+        if families > 0 && needed > capacity { Err(BuildError::FibreCapacity { needed, capacity }) } else { Ok(()) }
     }
 
     fn without_patches<M: Material>(
@@ -162,6 +179,7 @@ impl SceneFacts {
         if mesh.element_count() > MOST_ELEMENTS {
             return Err(BuildError::ElementCount { elements: mesh.element_count(), most: MOST_ELEMENTS });
         }
+        check_directions(material, mesh.all_tets().count())?;
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
         if mesh.has_removed() {
@@ -208,6 +226,7 @@ impl SceneFacts {
             checksum,
             has_point_masses: false,
             terms: terms_of(material),
+            families: families_of(material),
         })
     }
 
@@ -369,6 +388,8 @@ pub struct SceneView<'a, M> {
     pub(crate) tiles: &'a [ElementTile],
     /// For materials with nodal strain.
     pub(crate) patches: Patches<'a>,
+    /// For tissue with fibres.
+    pub(crate) fibres: &'a [FibreTile],
     facts: &'a SceneFacts,
 }
 
@@ -396,6 +417,7 @@ impl<'a, M> SceneView<'a, M> {
         nodes: &'a [NodeInertia],
         tiles: &'a [ElementTile],
         patches: &'a [PatchRow],
+        fibres: &'a [FibreTile],
         facts: &'a SceneFacts,
     ) -> Self {
         Self {
@@ -403,6 +425,7 @@ impl<'a, M> SceneView<'a, M> {
             inertia: nodes.get(..facts.node_count).unwrap_or_default(),
             tiles: tiles.get(..facts.tile_count()).unwrap_or_default(),
             patches: Patches::of(patches.get(..facts.patch_rows).unwrap_or_default()),
+            fibres,
             facts,
         }
     }
@@ -478,7 +501,19 @@ impl<'a, M: Material> SceneView<'a, M> {
     /// Fields of every element, in the order of the tables, under the given displacements (m).
     pub fn element_fields(self, displacement: &'a [NodeVector]) -> impl Iterator<Item = ElementFields> + use<'a, M> {
         let laws = self.material.laws();
-        self.places().map(move |(tile, lane)| element_fields(&laws.of(tile.element(lane)), tile, lane, displacement))
+        let of_fibres = move |element: usize, h: DMat3| {
+            let families = self.facts.families;
+            let tissue = usize::from(self.material.region(element));
+            let fibres = self.material.fibres().get(tissue).copied().unwrap_or_default();
+            let directions = directions_of(self.material, families, element);
+            // Not known where a host has given them and keeps none.
+            let known = families == 0 || !fibres.are_there() || directions != [DVec3::ZERO; 2];
+            if known { FibreTangent::new(&fibres, directions, h).kirchhoff_stress() } else { DMat3::NAN }
+        };
+        self.places().map(move |(tile, lane)| {
+            let element = tile.element(lane);
+            element_fields(&laws.of(element), tile, lane, displacement, |h| of_fibres(element, h))
+        })
     }
 
     /// Every element, as its place in the tables with its law.
@@ -523,6 +558,7 @@ impl<'a, M: Material> SceneView<'a, M> {
         memory: &[NodeVector],
     ) -> f64 {
         let remembered = self.series([0.0; 2], 0).map(|series| Remembered { series, memory });
+        let more = MoreEnergy { fibres: self.fibrous(), remembered };
         let laws = self.material.laws();
         let volumes = self.element().is_nodal_pressure().then(|| self.volume_rows(volumes));
         let tiles = self.energy_tiles().max(1);
@@ -535,14 +571,14 @@ impl<'a, M: Material> SceneView<'a, M> {
                 } else if self.element().is_nodal_strain() {
                     stabilising_energy(&law, tile, lane, displacement, remembered)
                 } else {
-                    element_energy(&law, (tile, [at, lane]), displacement, volumes, remembered)
+                    element_energy(&law, (tile, [at, lane]), displacement, volumes, more)
                 };
             }
             let patch = at - self.tiles.len();
             match self.patches.tiles().get(patch) {
                 Some(tile) if tile.volume(lane) > 0.0 => {
                     let law = laws.of(tile.element(lane));
-                    patch_energy(&law, self.patches, (tile, [patch, lane]), displacement, remembered)
+                    patch_energy(&law, self.patches, (tile, [patch, lane]), displacement, more)
                 }
                 _ => 0.0,
             }

@@ -166,7 +166,7 @@ mod contents {
         of_element: &'a [u16],
         prony: &'a [Prony],
     ) -> SceneMaterial<'a> {
-        SceneMaterial { element, law, tissues, of_element, prony }
+        SceneMaterial { element, law, tissues, of_element, prony, fibres: &[], directions: &[] }
     }
 }
 
@@ -204,7 +204,7 @@ mod contents {
     impl<'a> SceneMaterial<'a> {
         const fn any(&self) -> AnyMaterial<'a, SceneLaw> {
             let Self { element, law, tissues, of_element } = *self;
-            AnyMaterial { element, law, tissues, of_element, prony: &[] }
+            AnyMaterial { element, law, tissues, of_element, prony: &[], fibres: &[], directions: &[] }
         }
     }
 
@@ -273,7 +273,7 @@ impl<'a> OpenScene<'a> {
     }
 
     pub(super) fn view(&self) -> SceneView<'_, SceneMaterial<'a>> {
-        SceneView::new(&self.material, self.nodes, self.tiles, self.patches, self.facts)
+        SceneView::new(&self.material, self.nodes, self.tiles, self.patches, &[], self.facts)
     }
 
     pub(super) const fn node_count(&self) -> usize {
@@ -452,7 +452,7 @@ impl<'a> CheckedBody<'a> {
             moves: support.moves == 1,
         });
         let material = material_of((element, law), tissues, regions, prony);
-        Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches)?)
+        Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches, &mut [])?)
     }
 }
 

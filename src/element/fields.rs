@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 
 use super::barrier;
 use super::patch_forces::STABILISATION;
-use super::{ElementTile, PatchTile, Patches, Remembered, VolumeRows};
+use super::{ElementTile, Fibrous, PatchTile, Patches, Remembered, VolumeRows};
 use crate::material::{Invariants, Law, Potential, energy_density, response};
 use crate::simd::NodeVector;
 
@@ -49,29 +49,48 @@ fn displacements(vectors: &[NodeVector]) -> impl Fn(usize) -> DVec3 {
     |node| DVec3::from_array(vectors.get(node).copied().unwrap_or_default().to_array().map(f64::from))
 }
 
-/// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure, and with what the tissue
-/// remembers at `place` if it relaxes.
+/// What adds to the energy of a law.
+#[derive(Clone, Copy)]
+pub(crate) struct MoreEnergy<'a> {
+    /// The fibres, if there are any.
+    pub(crate) fibres: Option<Fibrous<'a>>,
+    /// What tissue that relaxes remembers.
+    pub(crate) remembered: Option<Remembered<'a>>,
+}
+
+impl MoreEnergy<'_> {
+    /// The density of the energy of what is at a place of a tile and belongs to a mesh element, J/m^3.
+    fn density<L: Law>(&self, law: &L, place: [usize; 2], element: usize, h: DMat3) -> f64 {
+        let (i, j, _) = invariants(h);
+        let of_fibres = self.fibres.map_or(0.0, |fibres| fibres.energy_density(place, element, h));
+        let of_past = self.remembered.map_or(0.0, |of| of.energy_density(law, place, element, h, self.fibres));
+        energy_density(law, i, j) + of_fibres + of_past
+    }
+}
+
+/// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure.
 pub(crate) fn element_energy<L: Law>(
     law: &L,
     (tile, place): (&ElementTile, [usize; 2]),
     displacement: &[NodeVector],
     volumes: Option<VolumeRows<'_>>,
-    remembered: Option<Remembered<'_>>,
+    more: MoreEnergy<'_>,
 ) -> f64 {
     let [_, lane] = place;
     let h = gradient_of(tile, lane, displacements(displacement));
-    let (i, j, _) = invariants(h);
+    let (_, j, _) = invariants(h);
     let of_nodes = volumes.map_or(0.0, |volumes| volume_energy_difference(law, tile, lane, j, volumes));
-    let of_past = remembered.map_or(0.0, |of| of.energy_density(law, place, tile.element(lane), h));
-    (energy_density(law, i, j) + of_past) * f64::from(tile.volume::<f32>(lane)) + of_nodes
+    more.density(law, place, tile.element(lane), h) * f64::from(tile.volume::<f32>(lane)) + of_nodes
 }
 
-/// Fields of the element at place `lane` of a tile, under the given displacements (m).
+/// Fields of the element at place `lane` of a tile, under the given displacements (m), and with a stress `F B F^T` (Pa)
+/// that fibres add in it at a displacement gradient.
 pub(crate) fn element_fields<L: Law>(
     law: &L,
     tile: &ElementTile,
     lane: usize,
     displacement: &[NodeVector],
+    of_fibres: impl Fn(DMat3) -> DMat3,
 ) -> ElementFields {
     let h = gradient_of(tile, lane, displacements(displacement));
     let f = DMat3::IDENTITY + h;
@@ -80,12 +99,12 @@ pub(crate) fn element_fields<L: Law>(
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
     let wide = law.splat::<f32>();
     let p1 = f64::from(response::<f32, L>(&wide, Invariants { i: i as f32, j: j as f32 }).p1);
-    let b = f * f.transpose();
+    let b = f * f.transpose() * p1 + of_fibres(h);
     let mean = (b.x_axis.x + b.y_axis.y + b.z_axis.z) / 3.0;
     let deviator = b - DMat3::from_diagonal(DVec3::splat(mean));
     let square = deviator.x_axis.length_squared() + deviator.y_axis.length_squared() + deviator.z_axis.length_squared();
     let volume_ratio = 1.0 + j;
-    let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
+    let von_mises = if volume_ratio > 0.0 { libm::sqrt(1.5 * square) / volume_ratio } else { f64::NAN };
     ElementFields { element: tile.element(lane), volume_ratio, von_mises }
 }
 
@@ -134,14 +153,13 @@ pub(crate) fn patch_energy<L: Law>(
     patches: Patches<'_>,
     (tile, place): (&PatchTile, [usize; 2]),
     displacement: &[NodeVector],
-    remembered: Option<Remembered<'_>>,
+    more: MoreEnergy<'_>,
 ) -> f64 {
     let [_, lane] = place;
     let h = tile.gradient(patches.neighbours_of(tile), lane, displacements(displacement));
-    let (i, j, square) = invariants(h);
-    let of_past = remembered.map_or(0.0, |of| of.energy_density(law, place, tile.element(lane), h));
-    let modulus = stabilising_modulus(law) * stays(remembered, tile.element(lane));
-    tile.volume(lane) * (energy_density(law, i, j) + of_past - 0.5 * modulus * square)
+    let (_, _, square) = invariants(h);
+    let modulus = stabilising_modulus(law) * stays(more.remembered, tile.element(lane));
+    tile.volume(lane) * (more.density(law, place, tile.element(lane), h) - 0.5 * modulus * square)
 }
 
 /// What an element adds to it, J: where it is crushed also the energy of [`super::barrier`].

@@ -2,6 +2,7 @@
 //! `P` (Pa) of [`crate::material`], the rest volume `V` (m^3) and the gradients of the shape functions `N_a` (1/m);
 //! Miller et al. 2007. The four forces of an element add up to zero.
 
+use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::material::{AnyLaw, Invariants, Law, LawState, Laws, response_operations};
@@ -14,8 +15,9 @@ use crate::simd::{
 
 use super::ElementTile;
 use super::deformation::{Deformation, LeftOut, Matrix, edges};
+use super::extension::{Extension, NoExtension};
 use super::pressure::{OwnPressure, Pressure};
-use super::relaxation::{Elastic, Past};
+use super::stiffness_bound::scale_of;
 
 /// The elements of a scene with their laws.
 #[derive(Clone, Copy)]
@@ -63,9 +65,9 @@ impl Extremes<f32> {
 
 /// A further computation from the deformation of an element, in the same pass as its forces.
 pub(crate) trait ElementVisitor {
-    /// Whether patches with nodal strain add the scalar stiffness bound to the fourth component of the forces of their
-    /// nodes.
-    const BOUNDS_PATCHES: bool = false;
+    /// Whether the scalar stiffness bound is added to the fourth component of the forces of the nodes: by
+    /// [`ElementVisitor::visit`], and of patches with nodal strain by these.
+    const BOUNDS: bool = false;
 
     /// Called for each vector of elements, those from place `first` of the tile on. Its result is added to the fourth
     /// component of the forces of their nodes.
@@ -98,7 +100,7 @@ impl ElementVisitor for NoVisitor {
 }
 
 /// The kernel that adds internal forces to the nodes of some partitions, in the order of the elements.
-pub struct InternalForces<'a, L, V, P = OwnPressure, K = Elastic> {
+pub struct InternalForces<'a, L, V, P = OwnPressure, K = NoExtension> {
     elements: Elements<'a, L>,
     pressure: P,
     /// Forces of the nodes in these partitions are computed.
@@ -108,7 +110,7 @@ pub struct InternalForces<'a, L, V, P = OwnPressure, K = Elastic> {
     remainder: Gather<'a>,
     force: Scatter<'a>,
     visitor: V,
-    past: K,
+    extension: K,
 }
 
 impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
@@ -124,48 +126,51 @@ impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
     ) -> Self {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
         let [displacement, remainder] = moved.map(Gather::new);
-        Self { elements, pressure, partitions, displacement, remainder, force, visitor, past: Elastic }
+        Self { elements, pressure, partitions, displacement, remainder, force, visitor, extension: NoExtension }
     }
 }
 
 impl<'a, L: Law + Into<AnyLaw>, V, P> InternalForces<'a, L, V, P> {
-    /// The same for tissue that knows more of the past.
-    pub(crate) fn with_past<K>(self, past: K) -> InternalForces<'a, AnyLaw, V, P, K> {
+    /// The same with what the stress has besides that of the law.
+    pub(crate) fn with_extension<K>(self, extension: K) -> InternalForces<'a, AnyLaw, V, P, K> {
         let Self { elements: Elements { laws, tiles, partitions: all }, pressure, partitions, .. } = self;
         let Self { displacement, remainder, force, visitor, .. } = self;
         let elements = Elements { laws: laws.any(), tiles, partitions: all };
-        InternalForces { elements, pressure, partitions, displacement, remainder, force, visitor, past }
+        InternalForces { elements, pressure, partitions, displacement, remainder, force, visitor, extension }
     }
 }
 
-impl<L: Law, V: ElementVisitor, P: Pressure, K: Past> Kernel for InternalForces<'_, L, V, P, K> {
+impl<L: Law, V: ElementVisitor, P: Pressure, K: Extension> Kernel for InternalForces<'_, L, V, P, K> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        if R::COUNT > 8 { in_batches::<R, L, P, K, WIDE_BATCH>(self) } else { in_batches::<R, L, P, K, BATCH>(self) }
+        if R::COUNT > 8 { in_batches::<R, L, V, P, K, WIDE_BATCH>(self) } else { in_batches::<R, L, V, P, K, BATCH>(self) }
     }
 
     #[inline(always)]
     fn run_scalar(self) -> Extremes<f32> {
-        in_batches::<f32, L, P, K, SCALAR_BATCH>(self)
+        in_batches::<f32, L, V, P, K, SCALAR_BATCH>(self)
     }
 }
 
 #[inline(always)]
-fn in_batches<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
-    kernel: InternalForces<'_, L, impl ElementVisitor, P, K>,
+fn in_batches<R: Real, L: Law, V: ElementVisitor, P: Pressure, K: Extension, const SIZE: usize>(
+    kernel: InternalForces<'_, L, V, P, K>,
 ) -> Extremes<f32> {
-    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, visitor, past } = kernel;
+    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, visitor, extension } = kernel;
     let Elements { laws, tiles, partitions: all } = elements;
     let displacement = pressure.displacement().unwrap_or(displacement);
-    let (mut extremes, mut asked) = (Extremes::<Pair<R>>::none(), (visitor, past));
+    let (mut extremes, mut asked) = (Extremes::<Pair<R>>::none(), (visitor, extension));
     for (touching, length) in all.touching(partitions) {
         let tiles = (tiles.get(touching).unwrap_or_default(), length);
         let input = (displacement, remainder, pressure);
-        add_forces::<R, L, P, K, SIZE>(&laws, tiles, input, &mut force, &mut asked, &mut extremes);
+        add_forces::<R, L, V, P, K, SIZE>(&laws, tiles, input, &mut force, &mut asked, &mut extremes);
+    }
+    if K::EXTENDS {
+        extremes.saturation = extremes.saturation.max(Pair::splat(asked.1.saturation()));
     }
     Extremes::none().merged_with(&extremes)
 }
@@ -213,12 +218,12 @@ const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 /// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]). Tissue that
 /// remembers has its stress computed in one pass more.
 #[inline(always)]
-pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usize>(
+pub(crate) fn add_forces<R: Real, L: Law, V: ElementVisitor, P: Pressure, K: Extension, const SIZE: usize>(
     laws: &Laws<'_, L>,
     (tiles, length): (&[ElementTile], usize),
     input: (Gather<'_>, Gather<'_>, P),
     force: &mut Scatter<'_>,
-    (visitor, past): &mut (impl ElementVisitor, K),
+    (visitor, extension): &mut (V, K),
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = tiles.first() else { return };
@@ -241,13 +246,13 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, K: Past, const SIZE: usiz
                 *kept = K::of_law(local);
             }
         }
-        if K::REMEMBERS {
+        if K::EXTENDS {
             let batch = batch.get_mut(..count).unwrap_or_default();
-            R::run_piece(Relax { batch, kept: &kept, past: &mut *past });
+            R::run_piece(Extend::<_, V, _> { batch, kept: &kept, extension: &mut *extension, visitor: PhantomData });
         }
         let batch = batch.get(..count).unwrap_or_default();
         let force = force.reborrow();
-        if K::REMEMBERS {
+        if K::EXTENDS {
             R::run_piece(AddForces::<_, true> { batch, length, force });
         } else {
             R::run_piece(AddForces::<_, false> { batch, length, force });
@@ -364,24 +369,29 @@ fn visit<R: Real, L: Law>(
     elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
 }
 
-/// Between the second and the third pass, for tissue that remembers: its stress takes the place of `h`.
-struct Relax<'a, 'b, R: Real, K: Past> {
+/// Between the second and the third pass, for tissue with an extension: its stress takes the place of `h`.
+struct Extend<'a, 'b, R: Real, V, K: Extension> {
     batch: &'a mut [ElementVector<'b, R>],
     kept: &'a [K::Local<R>],
-    past: &'a mut K,
+    extension: &'a mut K,
+    visitor: PhantomData<V>,
 }
 
-impl<R: Real, K: Past> Piece for Relax<'_, '_, R, K> {
+impl<R: Real, V: ElementVisitor, K: Extension> Piece for Extend<'_, '_, R, V, K> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { batch, kept, past } = self;
+        let Self { batch, kept, extension, .. } = self;
         for (elements, local) in batch.iter_mut().zip(kept) {
             let ElementVector { tile, first, p1, s, .. } = *elements;
             let deformation = Deformation::with(elements.h, elements.invariants);
             let element = |lane: usize| tile.element(first + lane);
-            elements.h = past.stress((tile, first), element, &deformation, [p1, s], local);
+            if V::BOUNDS {
+                let bound = extension.scalar_bound((tile, first), element, &deformation);
+                elements.fourth = scale_of::<R>(tile, first).fused(bound, elements.fourth);
+            }
+            elements.h = extension.stress((tile, first), element, &deformation, [p1, s], local);
         }
     }
 }

@@ -7,8 +7,8 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::internal_forces::ElementVisitor;
 use super::{
-    CriticalBounds, ElementTangents, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure, PatchBounds,
-    PatchForces, PatchTangents, Relaxing, ScalarBound, TileTangents,
+    CriticalBounds, ElementTangents, Extended, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure, PatchBounds,
+    PatchForces, PatchTangents, ScalarBound, TileTangents,
 };
 
 /// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,
@@ -90,45 +90,46 @@ pub(crate) fn tangents<L: ElementLaw>(
     }
 }
 
-/// A visitor with which the internal forces of tissue that relaxes are compiled: once, for a law known at run time.
-pub(crate) trait RelaxingVisitor: ElementVisitor + Copy + Sync {
-    fn relaxing_forces(kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Relaxing<'_>>) -> Extremes<f32>;
-    fn relaxing_nodal_pressure_forces(
-        kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Relaxing<'_>>,
+/// A visitor with which the internal forces of tissue with fibres or that relaxes are compiled: once, for a law known at
+/// run time.
+pub(crate) trait ExtendedVisitor: ElementVisitor + Copy + Sync {
+    fn extended_forces(kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Extended<'_>>) -> Extremes<f32>;
+    fn extended_nodal_pressure_forces(
+        kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Extended<'_>>,
     ) -> Extremes<f32>;
-    fn relaxing_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Relaxing<'_>>) -> Extremes<f32>;
+    fn extended_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Extended<'_>>) -> Extremes<f32>;
 }
 
-macro_rules! implement_relaxing {
+macro_rules! implement_extended {
     ($($visitor:ty),*) => {
         $(
-            impl RelaxingVisitor for $visitor {
+            impl ExtendedVisitor for $visitor {
                 #[inline(never)]
-                fn relaxing_forces(
-                    kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Relaxing<'_>>,
+                fn extended_forces(
+                    kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Extended<'_>>,
                 ) -> Extremes<f32> {
                     dispatch(kernel)
                 }
 
                 #[inline(never)]
-                fn relaxing_nodal_pressure_forces(
-                    kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Relaxing<'_>>,
+                fn extended_nodal_pressure_forces(
+                    kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Extended<'_>>,
                 ) -> Extremes<f32> {
                     dispatch(kernel)
                 }
 
                 #[inline(never)]
-                fn relaxing_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Relaxing<'_>>) -> Extremes<f32> {
+                fn extended_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Extended<'_>>) -> Extremes<f32> {
                     dispatch(kernel)
                 }
             }
         )*
     };
 }
-implement_relaxing!(NoVisitor, ScalarBound);
+implement_extended!(NoVisitor, ScalarBound);
 
 /// A visitor with which the internal forces of every law are compiled.
-pub(crate) trait ForcesVisitor<L: ElementLaw>: RelaxingVisitor {
+pub(crate) trait ForcesVisitor<L: ElementLaw>: ExtendedVisitor {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
     fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32>;

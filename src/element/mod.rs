@@ -12,6 +12,10 @@ mod barrier_forces;
 mod critical_bounds;
 mod crushed;
 mod deformation;
+mod extension;
+mod fibre_bounds;
+mod fibre_tangent;
+mod fibres;
 mod fields;
 mod internal_forces;
 mod kernels;
@@ -34,6 +38,7 @@ pub(crate) mod symmetric;
 mod tile;
 mod tile_tangents;
 
+pub use fibres::FibreTile;
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
 pub(crate) use kernels::{ForcesVisitor, tangents};
@@ -57,14 +62,22 @@ pub(crate) use crushed::{
     CrushedElements, LOOK_CYCLE, LOOK_CYCLE_OF_LONG, Look, MARKED, each_marked, forget_crushed, is_marked_at,
     mark_moment, mask_of, masks, masks_mut,
 };
-pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
+pub(crate) use fields::{MoreEnergy, element_energy, element_fields, patch_energy, stabilising_energy};
+pub(crate) use fibre_bounds::{
+    add_fibre_bounds, add_fibre_tangents, add_patch_fibre_bounds, add_patch_fibre_tangents,
+};
+pub(crate) use fibre_tangent::FibreTangent;
+pub(crate) use fibres::{Fibrous, unit_directions};
 #[cfg(feature = "std")]
 pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
-pub(crate) use relaxation::{Elastic, Relaxing, Series, VECTORS_OF_TERM};
+#[cfg(feature = "std")]
+pub(crate) use extension::place_in;
+pub(crate) use extension::{Extended, NoExtension};
+pub(crate) use relaxation::{Relaxing, Series, VECTORS_OF_TERM};
 pub(crate) use relaxation_energy::Remembered;
 pub(crate) use stiffness_bound::ScalarBound;
 pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};

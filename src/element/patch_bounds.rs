@@ -133,14 +133,14 @@ impl<R: Real, const PARTS: usize> Piece for AddBounds<'_, '_, R, PARTS> {
 
 /// Root of the largest inverse mass of a node along its axes.
 #[inline(always)]
-fn mass_root<R: Real>(nodes: &TileNodes<'_, 1>, first: usize, inertia: Gather<'_>) -> R {
+pub(super) fn mass_root<R: Real>(nodes: &TileNodes<'_, 1>, first: usize, inertia: Gather<'_>) -> R {
     let [x, y, z] = inertia.read_nodes::<R, 1>(nodes, 0, first);
     x.max(y).max(z).max(R::splat(0.0)).sqrt()
 }
 
 /// `c_ab / sqrt(V_a m_b)`.
 #[inline(always)]
-fn weighted_gradient<R: Real>(
+pub(super) fn weighted_gradient<R: Real>(
     neighbour: &Neighbours,
     first: usize,
     nodes: &TileNodes<'_, 1>,

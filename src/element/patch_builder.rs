@@ -3,7 +3,9 @@
 //! around a node. Sums are taken in float64 in the order of the element tables, gradients in 1/m, volumes in m^3.
 
 use bytemuck::{must_cast_mut, must_cast_slice_mut};
+use glam::DVec3;
 
+use super::fibres::{FibreTile, MeanDirections};
 use super::ElementTile;
 use super::patch::{Neighbours, PatchLayout, PatchRow, PatchTile, ROW_WORDS};
 use crate::heap_sort::sort;
@@ -87,7 +89,7 @@ fn take_halves<'a>(rows: &mut &'a mut [PatchRow], count: usize) -> Option<&'a mu
 }
 
 /// What patches are built from. Corners of elements are numbered: four for each place of each tile.
-pub(crate) struct PatchBuilder<'a, F> {
+pub(crate) struct PatchBuilder<'a, F, D> {
     pub(crate) nodes: usize,
     pub(crate) elements: usize,
     pub(crate) tiles: &'a [ElementTile],
@@ -96,6 +98,8 @@ pub(crate) struct PatchBuilder<'a, F> {
     pub(crate) tissues: usize,
     /// The tissue of an element of the mesh.
     pub(crate) region: F,
+    /// Unit vectors along the fibres of an element of the mesh.
+    pub(crate) directions: D,
 }
 
 /// An element around a node: its tile and place, and which of its corners the node is.
@@ -126,11 +130,12 @@ impl Corner<'_> {
     }
 }
 
-impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
+impl<F: Fn(usize) -> u16, D: Fn(usize) -> [DVec3; 2]> PatchBuilder<'_, F, D> {
     /// Fills `rows` with the patches of all nodes, one for each tissue of a node, and gives how many rows these take.
     /// Else how many rows are enough: exactly as many as are needed, if there was room to count them; what
     /// [`patch_rows_for`] tells, if there was not even room for the nodes.
-    pub(crate) fn build(&self, rows: &mut [PatchRow]) -> Result<usize, usize> {
+    /// Writes the mean directions of fibres to as many tiles as there are.
+    pub(crate) fn build(&self, rows: &mut [PatchRow], fibres: &mut [FibreTile]) -> Result<usize, usize> {
         let mut free = &mut *rows;
         let Some(ends) = take_halves(&mut free, self.nodes) else {
             return Err(patch_rows_for(self.nodes, self.elements, self.tissues));
@@ -160,6 +165,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
         };
         let (tiles, neighbours) = rest.split_at_mut_checked(tiles).unwrap_or_default();
         let (tiles, neighbours) = (must_cast_slice_mut(tiles), must_cast_slice_mut(neighbours));
+        self.write_fibres(around, order, fibres);
         *must_cast_mut(layout) = self.write(around, order, pairs, tiles, neighbours);
         Ok(taken)
     }
@@ -325,6 +331,19 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
             layout.ends.iter_mut().skip(group).for_each(|end| *end = index as u32 + 1);
         }
         layout
+    }
+
+    fn write_fibres(&self, around: &[u32], order: &[u64], fibres: &mut [FibreTile]) {
+        for (tile, members) in fibres.iter_mut().zip(tiles_of(order)) {
+            *tile = FibreTile::EMPTY;
+            for (lane, &key) in members.iter().enumerate() {
+                let mut mean = MeanDirections::NONE;
+                for corner in self.patch(around, first_of(key)).iter().filter_map(|&number| self.corner(number)) {
+                    mean.add((self.directions)(corner.tile.element(corner.lane)), corner.volume());
+                }
+                tile.write(lane, mean.directions());
+            }
+        }
     }
 
     fn write_tile(&self, around: &[u32], members: &[u64], pairs: &mut [u64], rows: &mut [Neighbours]) -> PatchTile {

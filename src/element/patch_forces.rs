@@ -17,10 +17,10 @@ use crate::material::{AnyLaw, Law, LawState, Laws, Potential};
 use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
+use super::extension::{Extension, NoExtension};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
 use super::patch_deformation::{GradientLengths, gradient};
-use super::relaxation::{Elastic, Past};
 use super::stiffness_bound::{Coefficients, scalar_bound_of_patches};
 use super::tile::vector_at;
 
@@ -29,7 +29,7 @@ use super::tile::vector_at;
 pub(crate) const STABILISATION: f32 = 0.4;
 
 /// The kernel that adds internal forces to the nodes of some partitions, and what the visitor asks for.
-pub struct PatchForces<'a, L, V, K = Elastic> {
+pub struct PatchForces<'a, L, V, K = NoExtension> {
     pub(crate) laws: Laws<'a, L>,
     pub(crate) patches: Patches<'a>,
     pub(crate) partitions: Range<usize>,
@@ -38,18 +38,18 @@ pub struct PatchForces<'a, L, V, K = Elastic> {
     pub(crate) remainder: &'a [NodeVector],
     pub(crate) force: Scatter<'a>,
     pub(crate) visitor: PhantomData<V>,
-    pub(crate) past: K,
+    pub(crate) extension: K,
 }
 
 impl<'a, L: Law + Into<AnyLaw>, V> PatchForces<'a, L, V> {
-    /// The same for tissue that knows more of the past.
-    pub(crate) fn with_past<K>(self, past: K) -> PatchForces<'a, AnyLaw, V, K> {
-        let Self { laws, patches, partitions, displacement, remainder, force, visitor, past: Elastic } = self;
-        PatchForces { laws: laws.any(), patches, partitions, displacement, remainder, force, visitor, past }
+    /// The same with what the stress has besides that of the law.
+    pub(crate) fn with_extension<K>(self, extension: K) -> PatchForces<'a, AnyLaw, V, K> {
+        let Self { laws, patches, partitions, displacement, remainder, force, visitor, extension: NoExtension } = self;
+        PatchForces { laws: laws.any(), patches, partitions, displacement, remainder, force, visitor, extension }
     }
 }
 
-impl<L: Law, V: ElementVisitor, K: Past> Kernel for PatchForces<'_, L, V, K> {
+impl<L: Law, V: ElementVisitor, K: Extension> Kernel for PatchForces<'_, L, V, K> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
@@ -67,10 +67,10 @@ impl<L: Law, V: ElementVisitor, K: Past> Kernel for PatchForces<'_, L, V, K> {
 }
 
 #[inline(always)]
-fn add_all<R: Real, L: Law, V: ElementVisitor, K: Past, const PARTS: usize>(
+fn add_all<R: Real, L: Law, V: ElementVisitor, K: Extension, const PARTS: usize>(
     kernel: PatchForces<'_, L, V, K>,
 ) -> Extremes<f32> {
-    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, mut past, .. } = kernel;
+    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, mut extension, .. } = kernel;
     let moved = [displacement, remainder].map(Gather::new);
     let mut extremes = Extremes::<R>::none();
     for tile in patches.touching(partitions) {
@@ -78,9 +78,12 @@ fn add_all<R: Real, L: Law, V: ElementVisitor, K: Past, const PARTS: usize>(
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
             *stress =
-                stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut past, &mut extremes);
+                stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut extension, &mut extremes);
         }
         scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
+    }
+    if K::EXTENDS {
+        extremes.saturation = extremes.saturation.max(R::splat(extension.saturation()));
     }
     Extremes::none().merged_with(&extremes)
 }
@@ -113,13 +116,13 @@ impl<R: Real> Stress<R> {
 }
 
 #[inline(always)]
-fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Past>(
+fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
     laws: &Laws<'_, L>,
     tile: &PatchTile,
     neighbours: &[Neighbours],
     first: usize,
     moved: [Gather<'_>; 2],
-    past: &mut K,
+    extension: &mut K,
     extremes: &mut Extremes<R>,
 ) -> Stress<R> {
     let (h, pull) = gradient::<R>(tile, neighbours, first, moved);
@@ -131,8 +134,8 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Past>(
     extremes.saturation = response.saturation.max(extremes.saturation);
     let modulus = modulus_of::<R, L>(&law);
     let (place, element) = ((tile, first), |lane| tile.element(first + lane));
-    let stabilising = past.stabilising(modulus, element);
-    let mut p = past.stress(place, element, &deformation, [response.p1, response.s], &K::of_law(&local));
+    let stabilising = extension.stabilising(modulus, element);
+    let mut p = extension.stress(place, element, &deformation, [response.p1, response.s], &K::of_law(&local));
     for i in 0..3 {
         for j in 0..3 {
             p[i][j] = p[i][j] - stabilising * h[i][j];
@@ -140,13 +143,16 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Past>(
     }
     let own = [stabilising * pull[0], stabilising * pull[1], stabilising * pull[2]];
     let stress = Stress { p, own, ..Stress::zero() };
-    if !V::BOUNDS_PATCHES {
+    if !V::BOUNDS {
         return stress;
     }
     let lengths = GradientLengths::<R>::of(neighbours, first);
     let scale = lengths.sum * vector_at::<R>(&tile.inverse_volumes, first);
     let coefficients = Coefficients::new::<L>(&law, &local).less(modulus);
-    let scalar = scalar_bound_of_patches(&coefficients, &deformation, scale);
+    let mut scalar = scalar_bound_of_patches(&coefficients, &deformation, scale);
+    if K::EXTENDS {
+        scalar = scale.fused(extension.scalar_bound(place, element, &deformation), scalar);
+    }
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }
 
@@ -167,7 +173,7 @@ fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
             let first = part * R::COUNT;
             let gradient = neighbour.gradient::<R>(first);
             let mut row = [zero; 4];
-            if V::BOUNDS_PATCHES {
+            if V::BOUNDS {
                 row[3] = stress.scalar * dot(gradient, gradient).root();
             }
             for i in 0..3 {

@@ -27,10 +27,12 @@
 
 use bytemuck::must_cast_slice;
 
-use crate::material::{LawState, MOST_TERMS, Prony};
+use crate::material::{MOST_TERMS, Prony};
 use crate::simd::{NodeVector, Real, TILE, dot};
 
 use super::deformation::{Deformation, Matrix};
+use super::extension::{Distortion, place_of};
+use super::fibres::FibreStress;
 use super::tile::{vector_at, write_at};
 
 /// Components of a symmetric matrix: xx, yy, zz, xy, yz, zx.
@@ -39,70 +41,8 @@ pub(super) const COMPONENTS: usize = 6;
 /// Vectors of one copy of the memory of a term of a tile.
 pub(crate) const VECTORS_OF_TERM: usize = COMPONENTS * TILE / 4;
 
-/// Least share of the stabilising energy of nodal strain that stays, see [`Past::stabilising`] of [`Relaxing`].
+/// Least share of the stabilising energy of nodal strain that stays, see [`Relaxing::stabilising`].
 const LEAST_STABILISING: f32 = 0.5;
-
-/// What the stress of elements knows of the past.
-pub(crate) trait Past {
-    /// Whether that is more than nothing.
-    const REMEMBERS: bool;
-
-    /// What of the law it needs to know of a vector of elements.
-    type Local<R: Real>: Copy;
-
-    /// Of elements at rest.
-    fn at_rest<R: Real>() -> Self::Local<R>;
-
-    /// Of elements in this state.
-    fn of_law<R: Real>(local: &LawState<R>) -> Self::Local<R>;
-
-    /// The modulus of the stabilising energy of nodal strain, Pa, from that of the law.
-    fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R;
-
-    /// The first Piola-Kirchhoff stress, Pa, from the law's `p1` and `s` ([`Deformation::stress`]). Called once for each
-    /// vector of elements, those from place `first` of a tile on, of which `element` gives the mesh element in a lane.
-    fn stress<R: Real, T>(
-        &mut self,
-        place: (&T, usize),
-        element: impl Fn(usize) -> usize,
-        deformation: &Deformation<R>,
-        scalars: [R; 2],
-        local: &Self::Local<R>,
-    ) -> Matrix<R>;
-}
-
-/// The stress depends on the present alone.
-#[derive(Clone, Copy)]
-pub struct Elastic;
-
-impl Past for Elastic {
-    const REMEMBERS: bool = false;
-
-    type Local<R: Real> = ();
-
-    #[inline(always)]
-    fn at_rest<R: Real>() {}
-
-    #[inline(always)]
-    fn of_law<R: Real>(_: &LawState<R>) {}
-
-    #[inline(always)]
-    fn stabilising<R: Real>(&self, modulus: R, _: impl Fn(usize) -> usize) -> R {
-        modulus
-    }
-
-    #[inline(always)]
-    fn stress<R: Real, T>(
-        &mut self,
-        _: (&T, usize),
-        _: impl Fn(usize) -> usize,
-        deformation: &Deformation<R>,
-        [p1, s]: [R; 2],
-        (): &(),
-    ) -> Matrix<R> {
-        deformation.stress(p1, s)
-    }
-}
 
 /// The series of all tissues, and how far a step goes.
 #[derive(Clone, Copy, Debug)]
@@ -241,23 +181,6 @@ impl Series<'_> {
     }
 }
 
-/// The place of an item in the table that begins at address `table`.
-#[inline(always)]
-fn place_of<T>(table: usize, item: &T) -> usize {
-    core::ptr::from_ref(item).addr().wrapping_sub(table) / size_of::<T>().max(1)
-}
-
-/// What relaxation needs to know of the law.
-#[derive(Clone, Copy)]
-pub(crate) struct Distortion<R> {
-    /// `2 W' / J^2`, Pa, and `J^(-2/3)`.
-    scale: R,
-    factor: R,
-    /// `J - 1` and `1 / J`, `J` no less than [`crate::material::J_FLOOR`].
-    change: R,
-    inverse: R,
-}
-
 /// A component of `M^T M + M + M^T`.
 #[inline(always)]
 fn square<R: Real>(m: &Matrix<R>, i: usize, j: usize) -> R {
@@ -265,6 +188,20 @@ fn square<R: Real>(m: &Matrix<R>, i: usize, j: usize) -> R {
 }
 
 impl<R: Real> Distortion<R> {
+    /// Adds to `A` what fibres add: `B - B:C / (3 J^2) N^T N`.
+    #[inline(always)]
+    fn add_fibres(&self, driving: &mut [R; COMPONENTS], fibres: &FibreStress<R>, m: &Matrix<R>) {
+        let (one, zero) = (R::splat(1.0), R::splat(0.0));
+        let less = fibres.inner * (self.inverse * self.inverse) * R::splat(-1.0 / 3.0);
+        let own = fibres.symmetric();
+        let places = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
+        for component in 0..COMPONENTS {
+            let [i, j] = places[component];
+            let square = square(m, i, j) + if i == j { one } else { zero };
+            driving[component] = driving[component] + less.fused(square, own[component]);
+        }
+    }
+
     /// `J^2 A / (2 W')` from `M = cof F - I` without cancellation: `J^2 I - I1 / 3 N^T N` with `N = I + M`.
     #[inline(always)]
     fn shape(&self, m: &Matrix<R>, i: R) -> [R; COMPONENTS] {
@@ -283,15 +220,13 @@ impl<R: Real> Distortion<R> {
 }
 
 impl Relaxing<'_> {
-    /// `sum_i Q_i` at present, from the memory of a vector of elements and `A = scale shape` (Pa), and the memory after
-    /// the step.
+    /// `sum_i Q_i` at present, from the memory of a vector of elements and `A` (Pa), and the memory after the step.
     #[inline(always)]
     fn relax<R: Real, T>(
         &mut self,
         (tile, first): (&T, usize),
         element: impl Fn(usize) -> usize,
-        scale: R,
-        shape: &[R; COMPONENTS],
+        driving: &[R; COMPONENTS],
     ) -> [R; COMPONENTS] {
         let tile = place_of(self.table, tile);
         let (part, terms) = (R::splat(self.part), self.series.terms.min(MOST_TERMS));
@@ -300,7 +235,6 @@ impl Relaxing<'_> {
         for term in 0..terms {
             let [share, at_step, over_step] =
                 [0, 1, 2].map(|number| self.gathered::<R>(&tissues, |of| of.terms[term % MOST_TERMS][number % 3]));
-            let driving = share * scale;
             let rows = COMPONENTS * (terms * tile + term);
             let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
             let own = rows.wrapping_sub(COMPONENTS * terms * self.own);
@@ -309,7 +243,7 @@ impl Relaxing<'_> {
             let mut next = [R::splat(0.0); COMPONENTS];
             for component in 0..COMPONENTS {
                 let q = vector_at::<R>(&before[component], first);
-                let missing = driving.fused(shape[component], -q);
+                let missing = share.fused(driving[component], -q);
                 sum[component] = at_step.fused(missing, sum[component] + q);
                 next[component] = q + over_step.fused(missing, part * q);
             }
@@ -323,41 +257,26 @@ impl Relaxing<'_> {
     }
 }
 
-impl Past for Relaxing<'_> {
-    const REMEMBERS: bool = true;
-
-    type Local<R: Real> = Distortion<R>;
-
-    #[inline(always)]
-    fn at_rest<R: Real>() -> Distortion<R> {
-        let (zero, one) = (R::splat(0.0), R::splat(1.0));
-        Distortion { scale: zero, factor: one, change: zero, inverse: one }
-    }
-
-    #[inline(always)]
-    fn of_law<R: Real>(local: &LawState<R>) -> Distortion<R> {
-        let ([factor, ..], [change, inverse]) = (local.volume_factor(), local.clamped_volume());
-        Distortion { scale: (local.slope + local.slope) * (inverse * inverse), factor, change, inverse }
-    }
-
+impl Relaxing<'_> {
     /// That energy has no memory. It is of the tissue at rest, so that bodies rest as the softened law would, but of no
     /// less than half the law's, as rough motion is hardly held by less. Bounds are those of the whole: what is taken off
     /// is never negative.
     #[inline(always)]
-    fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
+    pub(super) fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
         modulus * self.gathered::<R>(&self.tissues::<R>(element), |of| of.stabilising)
     }
 
     /// With `q = -J^(-2/3) sum_i Q_i` the stress is `p1 (F - N) + (s - C:q / (3 J)) N + F q`. Every product below is small
-    /// at small strain.
+    /// at small strain. `fibres` are a part of what relaxes.
     #[inline(always)]
-    fn stress<R: Real, T>(
+    pub(super) fn stress<R: Real, T>(
         &mut self,
         place: (&T, usize),
         element: impl Fn(usize) -> usize,
         deformation: &Deformation<R>,
         [p1, s]: [R; 2],
         local: &Distortion<R>,
+        fibres: Option<&FibreStress<R>>,
     ) -> Matrix<R> {
         let h = deformation.h;
         let mut m = h;
@@ -367,7 +286,14 @@ impl Past for Relaxing<'_> {
             }
         }
         let i1 = deformation.invariants.i;
-        let sum = self.relax(place, element, local.scale, &local.shape(&m, i1));
+        let mut driving = local.shape(&m, i1);
+        for component in &mut driving {
+            *component = local.scale * *component;
+        }
+        if let Some(fibres) = fibres {
+            local.add_fibres(&mut driving, fibres, &m);
+        }
+        let sum = self.relax(place, element, &driving);
         let minus = -local.factor;
         let [xx, yy, zz, xy, yz, zx] = sum.map(|component| minus * component);
         let q = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];

@@ -238,7 +238,7 @@ pub(super) fn spatial_bound<R: Real>(coefficients: &Coefficients<R>, deformation
 pub struct ScalarBound;
 
 impl ElementVisitor for ScalarBound {
-    const BOUNDS_PATCHES: bool = true;
+    const BOUNDS: bool = true;
 
     #[inline(always)]
     fn visit<R: Real, L: Law>(

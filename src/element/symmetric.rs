@@ -41,6 +41,18 @@ impl<R: Real> Symmetric<R> {
         }
     }
 
+    #[inline(always)]
+    pub(crate) fn plus(self, other: &Self) -> Self {
+        Self {
+            xx: self.xx + other.xx,
+            yy: self.yy + other.yy,
+            zz: self.zz + other.zz,
+            xy: self.xy + other.xy,
+            yz: self.yz + other.yz,
+            zx: self.zx + other.zx,
+        }
+    }
+
     /// `factor A`.
     #[inline(always)]
     pub(crate) fn scaled(self, factor: R) -> Self {

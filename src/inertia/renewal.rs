@@ -18,7 +18,7 @@ use super::pulls::PullsInUse;
 use super::report::AddedInertia;
 use super::{COARSE_GROWTH, DRAG_AT_LARGEST_CHANGE, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::element::{
-    CrushedTangents, ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent,
+    add_fibre_tangents, add_patch_fibre_tangents, CrushedTangents, ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent,
     each_bounded, tangents,
 };
 use crate::mesh::partition::MOST_PARTS;
@@ -295,10 +295,16 @@ fn write_tangents<M: ElementMaterial>(
             if let Some(tile) = scene.patches.tiles().get(place) {
                 let neighbours = scene.patches.neighbours_of(tile);
                 *rows = M::Law::patch_tangents(PatchTangents { laws, tile, neighbours, displacement, weight });
+                if let Some(fibres) = scene.fibrous() {
+                    add_patch_fibre_tangents(fibres, (place, tile, neighbours), displacement, weight, rows);
+                }
             }
         } else if let Some(tile) = scene.tiles.get(place) {
             let kernel = ElementTangents { laws, pressure: OwnPressure, tile, displacement, weight };
             *rows = tangents(scene.element(), kernel, volume);
+            if let Some(fibres) = scene.fibrous() {
+                add_fibre_tangents(fibres, (place, tile), displacement, weight, rows);
+            }
         }
     });
 }

@@ -43,6 +43,7 @@ pub(crate) use for_each_law;
 
 for_each_law! { @ modules [] }
 mod any;
+mod fibres;
 mod moduli;
 mod prony;
 mod response;
@@ -50,14 +51,14 @@ mod tissue;
 
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
+pub(crate) use fibres::FibreTerm;
+pub use fibres::{Directions, FIBRE_TERMS, FibreError, Fibres};
 pub use moduli::Moduli;
 #[cfg(feature = "capi-neo-hookean")]
 pub(crate) use prony::{LONGEST, MOST_SHARE, SHORTEST};
 pub use prony::{MOST_TERMS, Prony, PronyError};
-#[cfg(feature = "std")]
-pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};
-pub(crate) use response::{LawState, energy_density, response, response_operations};
+pub(crate) use response::{LawState, VolumeFactor, energy_density, response, response_operations};
 #[cfg(feature = "std")]
 pub use tissue::VecMaterial;
 pub use tissue::{AnyMaterial, Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};

@@ -29,6 +29,8 @@ pub struct Response<R> {
 pub(crate) struct VolumeFactor<R> {
     pub(crate) g: R,
     pub(crate) slope: R,
+    /// `g - 1`, to full relative accuracy.
+    pub(crate) less_one: R,
     /// `J^(-5/3)` and `J^-1` at the clamped `J`.
     fifth: R,
     inverse: R,
@@ -60,7 +62,8 @@ impl<R: Real> VolumeFactor<R> {
         let i1 = at.i + R::splat(3.0);
         // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
         let x = square.fused(at.i, (R::splat(3.0) * e).fused(R::splat(2.0) + e, slope * below * i1));
-        Self { g: slope.fused(below, square), slope, fifth, inverse: square * y, clamped, below, x }
+        let less_one = slope.fused(below, e * (R::splat(2.0) + e));
+        Self { g: slope.fused(below, square), slope, less_one, fifth, inverse: square * y, clamped, below, x }
     }
 
     /// Second derivative of `g`: zero where it is continued along its tangent.
@@ -110,6 +113,12 @@ impl<R: Real> LawState<R> {
         [self.factor.g, self.factor.slope, self.factor.curvature()]
     }
 
+    /// `g - 1`.
+    #[inline(always)]
+    pub(crate) fn less_one(&self) -> R {
+        self.factor.less_one
+    }
+
     /// `J - 1`, no less than at [`J_FLOOR`], and `1 / J` there.
     #[inline(always)]
     pub(crate) fn clamped_volume(&self) -> [R; 2] {
@@ -130,11 +139,12 @@ impl<R: Real> LawState<R> {
 impl<R: Real> VolumeFactor<Pair<R>> {
     #[inline(always)]
     fn split(&self) -> [VolumeFactor<R>; 2] {
-        let Self { g, slope, fifth, inverse, clamped, below, x } = *self;
+        let Self { g, slope, less_one, fifth, inverse, clamped, below, x } = *self;
         [
             VolumeFactor {
                 g: g.0,
                 slope: slope.0,
+                less_one: less_one.0,
                 fifth: fifth.0,
                 inverse: inverse.0,
                 clamped: clamped.0,
@@ -144,6 +154,7 @@ impl<R: Real> VolumeFactor<Pair<R>> {
             VolumeFactor {
                 g: g.1,
                 slope: slope.1,
+                less_one: less_one.1,
                 fifth: fifth.1,
                 inverse: inverse.1,
                 clamped: clamped.1,

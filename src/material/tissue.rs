@@ -1,6 +1,6 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
-use super::{AnyLaw, Law, Prony, Values};
+use super::{AnyLaw, Directions, Fibres, Law, Prony, Values};
 use crate::simd::{Real, TILE};
 
 /// A law with a density.
@@ -104,6 +104,18 @@ pub trait Material: Sync {
     fn prony(&self) -> &[Prony] {
         &[]
     }
+
+    /// The fibres of the tissues, by index; those that are not listed have none.
+    #[inline(always)]
+    fn fibres(&self) -> &[Fibres] {
+        &[]
+    }
+
+    /// The directions of the fibres by mesh element, which a scene is built with.
+    #[inline(always)]
+    fn directions(&self) -> &[Directions] {
+        &[]
+    }
 }
 
 /// The same material in tetrahedra with average nodal pressure (Bonet & Burton 1998; for TLED with several tissues
@@ -117,6 +129,16 @@ impl<M: Material> Material for NodalPressure<M> {
     #[inline(always)]
     fn prony(&self) -> &[Prony] {
         self.0.prony()
+    }
+
+    #[inline(always)]
+    fn fibres(&self) -> &[Fibres] {
+        self.0.fibres()
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> &[Directions] {
+        self.0.directions()
     }
 
     #[inline(always)]
@@ -157,6 +179,16 @@ impl<M: Material> Material for NodalStrain<M> {
     #[inline(always)]
     fn prony(&self) -> &[Prony] {
         self.0.prony()
+    }
+
+    #[inline(always)]
+    fn fibres(&self) -> &[Fibres] {
+        self.0.fibres()
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> &[Directions] {
+        self.0.directions()
     }
 
     #[inline(always)]
@@ -327,6 +359,10 @@ pub struct AnyMaterial<'a, L = AnyLaw> {
     pub of_element: &'a [u16],
     /// How the tissues relax, by index; those that are not listed do not.
     pub prony: &'a [Prony],
+    /// The fibres of the tissues, by index; those that are not listed have none.
+    pub fibres: &'a [Fibres],
+    /// Their directions, by mesh element: read when a scene is built.
+    pub directions: &'a [Directions],
 }
 
 impl<'a, L: Law> AnyMaterial<'a, L> {
@@ -371,6 +407,16 @@ impl<L: Law> Material for AnyMaterial<'_, L> {
     fn prony(&self) -> &[Prony] {
         self.prony
     }
+
+    #[inline]
+    fn fibres(&self) -> &[Fibres] {
+        self.fibres
+    }
+
+    #[inline]
+    fn directions(&self) -> &[Directions] {
+        self.directions
+    }
 }
 
 /// [`AnyMaterial`] that owns its tissues.
@@ -387,6 +433,10 @@ pub struct VecMaterial {
     pub of_element: std::vec::Vec<u16>,
     /// See [`AnyMaterial::prony`].
     pub prony: std::vec::Vec<Prony>,
+    /// See [`AnyMaterial::fibres`].
+    pub fibres: std::vec::Vec<Fibres>,
+    /// See [`AnyMaterial::directions`].
+    pub directions: std::vec::Vec<Directions>,
 }
 
 #[cfg(feature = "std")]
@@ -395,12 +445,14 @@ impl VecMaterial {
     pub fn one(element: Element, law: impl Into<AnyLaw>, density: f32) -> Self {
         let law = law.into();
         let tissues = std::vec![Tissue { law, density }.values()];
-        Self { element, law, tissues, of_element: std::vec::Vec::new(), prony: std::vec::Vec::new() }
+        let (of_element, prony) = (std::vec::Vec::new(), std::vec::Vec::new());
+        let (fibres, directions) = (std::vec::Vec::new(), std::vec::Vec::new());
+        Self { element, law, tissues, of_element, prony, fibres, directions }
     }
 
     fn view(&self) -> AnyMaterial<'_> {
-        let Self { element, law, tissues, of_element, prony } = self;
-        AnyMaterial { element: *element, law: *law, tissues, of_element, prony }
+        let Self { element, law, tissues, of_element, prony, fibres, directions } = self;
+        AnyMaterial { element: *element, law: *law, tissues, of_element, prony, fibres, directions }
     }
 }
 
@@ -428,5 +480,15 @@ impl Material for VecMaterial {
     #[inline]
     fn prony(&self) -> &[Prony] {
         &self.prony
+    }
+
+    #[inline]
+    fn fibres(&self) -> &[Fibres] {
+        &self.fibres
+    }
+
+    #[inline]
+    fn directions(&self) -> &[Directions] {
+        &self.directions
     }
 }

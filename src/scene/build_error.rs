@@ -74,6 +74,29 @@ pub enum BuildError {
         /// Room.
         capacity: usize,
     },
+    /// More tiles of directions of fibres than the scene has room for.
+    FibreCapacity {
+        /// Tiles needed ([`FibreTile`](crate::element::FibreTile)).
+        needed: usize,
+        /// Room.
+        capacity: usize,
+    },
+    /// There are not as many directions of fibres as elements.
+    DirectionCount {
+        /// Directions given.
+        directions: usize,
+        /// Elements of the mesh.
+        elements: usize,
+    },
+    /// The directions of the fibres in an element are no directions, or both the same.
+    Direction {
+        /// The element.
+        element: usize,
+        /// Along the first family.
+        fibre: [f32; 3],
+        /// Along the second one.
+        sheet: [f32; 3],
+    },
 }
 
 impl From<MeshError> for BuildError {
@@ -108,6 +131,17 @@ impl fmt::Display for BuildError {
             Self::PatchCapacity { needed, capacity } => {
                 write!(f, "{needed} rows of patches are enough for nodal strain, the scene has room for {capacity}")
             }
+            Self::FibreCapacity { needed, capacity } => {
+                write!(f, "the fibres need {needed} tiles of directions, the scene has room for {capacity}")
+            }
+            Self::DirectionCount { directions, elements } => {
+                write!(f, "{directions} directions of fibres for {elements} elements: give one for each element")
+            }
+            Self::Direction { element, fibre: [a, b, c], sheet: [d, e, g] } => write!(
+                f,
+                "element {element}: fibres along ({a}, {b}, {c}) and sheets along ({d}, {e}, {g}): give vectors that are not zero \
+                 and not parallel"
+            ),
             Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
         }
     }

@@ -1,7 +1,7 @@
 //! Other constants of the laws in a scene that is built: its tables hold none of them, but for the energy that is
 //! nothing but rounding. That takes a pass over the elements, where building takes many.
 
-use super::{BuildError, ROUNDED_STRAIN, Scene, SceneFacts, SceneTables, terms_of};
+use super::{BuildError, ROUNDED_STRAIN, Scene, SceneFacts, SceneTables, families_of, terms_of};
 use crate::element::ElementTile;
 use crate::material::{Law, Material, Moduli};
 use crate::simd::TILE;
@@ -16,7 +16,8 @@ impl SceneFacts {
         new: &N,
     ) -> Result<bool, BuildError> {
         let several = [old.laws().has_several_tissues(), new.laws().has_several_tissues()];
-        if old.element() != new.element() || several[0] != several[1] || terms_of(new) != self.terms {
+        let have = [terms_of(new), families_of(new)];
+        if old.element() != new.element() || several[0] != several[1] || have != [self.terms, self.families] {
             return Ok(false);
         }
         let mut rounding = 0.0;

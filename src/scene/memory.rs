@@ -4,8 +4,8 @@ use core::ops::Range;
 
 #[cfg(feature = "capi-neo-hookean")]
 use super::SceneFacts;
-use super::{SceneView, tiles_for};
-use crate::element::{Series, VECTORS_OF_TERM, patch_tiles_for};
+use super::{SceneView, fibre_tiles_for};
+use crate::element::{Series, VECTORS_OF_TERM};
 use crate::material::{Element, Laws, Material, Prony};
 
 /// No fewer than [`SceneView::memory_vectors`] of any scene of so many nodes, elements and tissues, none of which
@@ -18,10 +18,7 @@ pub const fn memory_vectors_for(
     tissues: usize,
     terms: usize,
 ) -> usize {
-    let tiles = match element {
-        Element::NodalStrain => patch_tiles_for(nodes, elements, tissues),
-        _ => tiles_for(elements),
-    };
+    let tiles = fibre_tiles_for(element, nodes, elements, tissues);
     tiles.saturating_mul(2 * VECTORS_OF_TERM).saturating_mul(terms)
 }
 

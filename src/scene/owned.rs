@@ -4,8 +4,8 @@ use core::ops::Deref;
 
 use super::{AsScene, BuildError, SceneFacts, SceneView, Support};
 #[cfg(any(feature = "std", test))]
-use super::{patch_rows_for, tiles_for, tissue_count};
-use crate::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
+use super::{fibre_tiles_for, fibres::write_directions, patch_rows_for, tiles_for, tissue_count};
+use crate::element::{ElementMaterial, ElementTile, FibreTile, NodeInertia, PatchRow};
 use crate::material::Material;
 use crate::mesh::Mesh;
 
@@ -15,6 +15,10 @@ pub trait SceneTables {
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]);
     /// Rows of patches of materials with nodal strain.
     fn patches(&self) -> &[PatchRow] {
+        &[]
+    }
+    /// Directions of fibres.
+    fn fibres(&self) -> &[FibreTile] {
         &[]
     }
 }
@@ -39,7 +43,7 @@ impl<M, S: SceneTables> Scene<M, S> {
     /// The scene.
     pub fn view(&self) -> SceneView<'_, M> {
         let (nodes, tiles) = self.tables.tables();
-        SceneView::new(&self.material, nodes, tiles, self.tables.patches(), &self.facts)
+        SceneView::new(&self.material, nodes, tiles, self.tables.patches(), self.tables.fibres(), &self.facts)
     }
 }
 
@@ -51,16 +55,17 @@ impl<M: ElementMaterial, S: SceneTables> AsScene for Scene<M, S> {
     }
 }
 
-/// Tables for at most `N` nodes, `T` tiles of elements and `P` rows of patches.
+/// Tables for at most `N` nodes, `T` tiles of elements, `P` rows of patches and `F` tiles of directions of fibres.
 #[derive(Clone, Debug)]
-pub struct FixedTables<const N: usize, const T: usize, const P: usize = 0> {
+pub struct FixedTables<const N: usize, const T: usize, const P: usize = 0, const F: usize = 0> {
     nodes: heapless::Vec<NodeInertia, N>,
     tiles: heapless::Vec<ElementTile, T>,
-    /// An array, of which none takes no bytes.
+    /// Arrays, of which none takes no bytes.
     patches: [PatchRow; P],
+    fibres: [FibreTile; F],
 }
 
-impl<const N: usize, const T: usize, const P: usize> SceneTables for FixedTables<N, T, P> {
+impl<const N: usize, const T: usize, const P: usize, const F: usize> SceneTables for FixedTables<N, T, P, F> {
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
         (&self.nodes, &self.tiles)
     }
@@ -68,31 +73,40 @@ impl<const N: usize, const T: usize, const P: usize> SceneTables for FixedTables
     fn patches(&self) -> &[PatchRow] {
         &self.patches
     }
+
+    fn fibres(&self) -> &[FibreTile] {
+        &self.fibres
+    }
 }
 
 /// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`](super::tiles_for)), with nodal strain of at
-/// most `P` rows of patches ([`patch_rows_for`](super::patch_rows_for)), which may be a `static`.
-pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0> = Scene<M, FixedTables<N, T, P>>;
+/// most `P` rows of patches ([`patch_rows_for`](super::patch_rows_for)), with fibres of at most `F` tiles of directions
+/// ([`fibre_tiles_for`](super::fibre_tiles_for)), which may be a `static`.
+pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0, const F: usize = 0> = Scene<M, FixedTables<N, T, P, F>>;
 
-impl<M, const N: usize, const T: usize, const P: usize> FixedScene<M, N, T, P> {
+impl<M, const N: usize, const T: usize, const P: usize, const F: usize> FixedScene<M, N, T, P, F> {
     /// An empty scene.
     pub const fn new(material: M) -> Self {
-        let tables =
-            FixedTables { nodes: heapless::Vec::new(), tiles: heapless::Vec::new(), patches: [PatchRow::EMPTY; P] };
+        let tables = FixedTables {
+            nodes: heapless::Vec::new(),
+            tiles: heapless::Vec::new(),
+            patches: [PatchRow::EMPTY; P],
+            fibres: [FibreTile::EMPTY; F],
+        };
         Self { material, tables, facts: SceneFacts::EMPTY }
     }
 }
 
-impl<M: Material, const N: usize, const T: usize, const P: usize> FixedScene<M, N, T, P> {
+impl<M: Material, const N: usize, const T: usize, const P: usize, const F: usize> FixedScene<M, N, T, P, F> {
     /// Builds the scene in place from a mesh and its supports; a node may be listed more than once.
     /// On an error the scene is empty.
     pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
-        let Self { material, tables: FixedTables { nodes, tiles, patches }, facts } = self;
+        let Self { material, tables: FixedTables { nodes, tiles, patches, fibres }, facts } = self;
         *facts = SceneFacts::EMPTY;
         // All of it: what is too little is told with what is needed.
         let _ = nodes.resize(N, NodeInertia::EMPTY);
         let _ = tiles.resize(T, ElementTile::EMPTY);
-        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles, patches)?;
+        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles, patches, fibres)?;
         nodes.truncate(facts.node_count);
         tiles.truncate(facts.tile_count());
         Ok(())
@@ -106,6 +120,7 @@ pub struct VecTables {
     nodes: std::vec::Vec<NodeInertia>,
     tiles: std::vec::Vec<ElementTile>,
     patches: std::vec::Vec<PatchRow>,
+    fibres: std::vec::Vec<FibreTile>,
     /// Point masses, kg, with their nodes.
     masses: std::vec::Vec<(usize, f32)>,
 }
@@ -118,6 +133,10 @@ impl SceneTables for VecTables {
 
     fn patches(&self) -> &[PatchRow] {
         &self.patches
+    }
+
+    fn fibres(&self) -> &[FibreTile] {
+        &self.fibres
     }
 }
 
@@ -134,12 +153,17 @@ impl<M: Material> VecScene<M> {
         let supports = supports.iter().copied();
         let mut facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
-        let mut patches = std::vec::Vec::new();
+        let (mut patches, mut fibres) = (std::vec::Vec::new(), std::vec::Vec::new());
+        let tissues = tissue_count(&material);
+        if facts.families > 0 {
+            let tiles = fibre_tiles_for(material.element(), nodes.len(), facts.element_count, tissues);
+            fibres.resize(tiles, FibreTile::EMPTY);
+        }
         if material.element().is_nodal_strain() {
-            let mut rows = patch_rows_for(nodes.len(), facts.element_count, tissue_count(&material));
+            let mut rows = patch_rows_for(nodes.len(), facts.element_count, tissues);
             loop {
                 patches.resize(rows, PatchRow::EMPTY);
-                match facts.build_patches(&material, &tiles, &mut patches) {
+                match facts.build_patches(&material, &tiles, &mut patches, &mut fibres) {
                     Ok(()) => break,
                     Err(BuildError::PatchCapacity { needed, .. }) if needed > rows => rows = needed,
                     Err(error) => return Err(error),
@@ -147,8 +171,10 @@ impl<M: Material> VecScene<M> {
             }
             patches.truncate(facts.patch_rows);
             patches.shrink_to_fit();
+        } else if facts.families > 0 {
+            write_directions(&material, &tiles, &mut fibres)?;
         }
-        Ok(Self { material, tables: VecTables { nodes, tiles, patches, masses: std::vec![] }, facts })
+        Ok(Self { material, tables: VecTables { nodes, tiles, patches, fibres, masses: std::vec![] }, facts })
     }
 }
 

@@ -6,8 +6,8 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    AddCrushed, CrushedElements, CrushedForces, Elastic, ElementMaterial, ElementTile, Elements, Extremes,
-    ForcesVisitor, InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure,
+    AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extended, Extremes, Fibrous,
+    ForcesVisitor, InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NoExtension, NodalVolumes, NodeInertia, OwnPressure,
     PatchForces, Relaxing, Series, each_marked, is_marked_at, mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
@@ -275,10 +275,9 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     past: Option<PastOfPart<'_>>,
 ) -> Extremes<f32> {
     let elements = scene.elements();
-    // Seen by the compiler, which then leaves these kernels out where no tissue can relax.
-    let past = past.filter(|_| scene.vectors_of_tile() > 0);
-    let relaxing_elements =
-        |(series, before, after, own)| Relaxing::new::<ElementTile>(series, scene.tiles, before, after, own);
+    // Seen by the compiler, which then leaves these kernels out where no tissue can relax or has fibres.
+    let (fibres, past) = (scene.fibrous(), past.filter(|_| scene.vectors_of_tile() > 0));
+    let is_extended = fibres.is_some() || past.is_some();
     if scene.element().is_nodal_strain() {
         let (laws, patches, visitor) = (elements.laws, scene.patches, PhantomData);
         let ([displacement, remainder], of) = (moved, partitions.clone());
@@ -291,32 +290,40 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
             remainder,
             force: scatter,
             visitor,
-            past: Elastic,
+            extension: NoExtension,
         };
-        let mut extremes = match past {
-            None => V::patch_forces(kernel),
-            Some((series, before, after, own)) => {
-                let past = Relaxing::new(series, patches.tiles(), before, after, own);
-                V::relaxing_patch_forces(kernel.with_past(past))
-            }
+        let mut extremes = if is_extended {
+            let extension = extension_of(patches.tiles(), fibres, past);
+            V::extended_patch_forces(kernel.with_extension(extension))
+        } else {
+            V::patch_forces(kernel)
         };
-        let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS_PATCHES);
+        let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS);
         extremes.least_change = extremes.least_change.min(least);
         extremes
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
-        match past {
-            None => V::nodal_pressure_forces(kernel),
-            Some(past) => V::relaxing_nodal_pressure_forces(kernel.with_past(relaxing_elements(past))),
+        if is_extended {
+            let extension = extension_of(scene.tiles, fibres, past);
+            V::extended_nodal_pressure_forces(kernel.with_extension(extension))
+        } else {
+            V::nodal_pressure_forces(kernel)
         }
     } else {
         let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
-        match past {
-            None => V::forces(kernel),
-            Some(past) => V::relaxing_forces(kernel.with_past(relaxing_elements(past))),
+        if is_extended {
+            let extension = extension_of(scene.tiles, fibres, past);
+            V::extended_forces(kernel.with_extension(extension))
+        } else {
+            V::forces(kernel)
         }
     }
+}
+
+fn extension_of<'a, T>(table: &[T], fibres: Option<Fibrous<'a>>, past: Option<PastOfPart<'a>>) -> Extended<'a> {
+    let relaxing = past.map(|(series, before, after, own)| Relaxing::new(series, table, before, after, own));
+    Extended::new(table, fibres, relaxing)
 }
 
 /// Gravity and nodal forces on the nodes from `first` on, N.

@@ -5,7 +5,8 @@
 
 use crate::element::{
     CriticalBounds, ElementLaw, ElementMaterial, MeanPressure, NodalVolumeBounds, NodeInertia, NodeMatrices,
-    OwnPressure, PatchBounds, VolumeRows, add_crushed_bounds, balance, weigh,
+    OwnPressure, PatchBounds, VolumeRows, add_crushed_bounds, add_fibre_bounds,
+    add_patch_fibre_bounds, balance, weigh,
 };
 use crate::material::{Law, Laws, Potential};
 use crate::scene::{AsScene, SceneView};
@@ -129,6 +130,9 @@ fn with_bounds<M: ElementMaterial, T>(
         let mut add = |weights: &mut [NodeVector], sums: &mut NodeMatrices<'_>| {
             M::Law::patch_bounds(PatchBounds { laws, patches, inertia, weights, sums });
             crushed = crushed && add_crushed_bounds(scene.elements(), inertia, sums);
+            if let Some(fibres) = scene.fibrous() {
+                add_patch_fibre_bounds(fibres, patches, inertia, weights, sums);
+            }
         };
         weights.choose(rows, &mut sums, inertia, &mut add);
         add(rows, &mut sums);
@@ -151,6 +155,9 @@ fn with_bounds<M: ElementMaterial, T>(
         let pressure = MeanPressure::new(VolumeRows { rows: volume, several_tissues: true });
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: true, sums: &mut sums };
         M::Law::nodal_pressure_critical_bounds(kernel);
+    }
+    if let Some(fibres) = scene.fibrous().filter(|_| !scene.element().is_nodal_strain()) {
+        add_fibre_bounds(fibres, tiles, inertia, &mut sums);
     }
     let answer = with(&sums);
     sums.clear();

@@ -35,7 +35,7 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     }
     for (tile, lane, law) in scene.laws_at_places() {
         let volume = f64::from(tile.volume::<f32>(lane));
-        let ratio = element_fields(&law, tile, lane, state.displacement).volume_ratio;
+        let ratio = element_fields(&law, tile, lane, state.displacement, |_| glam::DMat3::ZERO).volume_ratio;
         for corner in 0..4 {
             if let Some((sum, weight)) = sums.get_mut(tile.node(corner, lane)) {
                 *sum += volume * pressure_at(&law, tile, lane, corner, ratio, volumes);

@@ -9,6 +9,7 @@ use std::vec::Vec;
 use glam::DVec3;
 
 use super::tangent::{ElementTangent, LawTangent};
+use crate::element::place_in;
 use crate::element::stabilising_modulus;
 use crate::material::Material;
 use crate::scene::SceneView;
@@ -142,7 +143,9 @@ impl PatchTangents {
         let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
         let patches = scene.patches.places().map(|(tile, lane)| {
             let h = tile.gradient(scene.patches.neighbours_of(tile), lane, at);
-            LawTangent::new(&laws.of(tile.element(lane)), h)
+            let place = [place_in(scene.patches.tiles(), tile), lane];
+            let fibres = scene.fibrous().map(|of| of.tangent(place, tile.element(lane), h));
+            LawTangent::new(&laws.of(tile.element(lane)), h, fibres)
         });
         let moduli = scene.places().map(|(tile, lane)| stabilising_modulus(&laws.of(tile.element(lane))));
         let crushed =

@@ -5,7 +5,7 @@ use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
 
-use crate::element::{ElementTile, barrier_factor, barrier_modulus};
+use crate::element::{ElementTile, FibreTangent, barrier_factor, barrier_modulus, place_in};
 use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -36,6 +36,8 @@ pub(super) struct LawTangent {
     /// `dx/dF = x_f F + x_c C`.
     x_f: f64,
     x_c: f64,
+    /// Of the fibres, if there are any.
+    fibres: Option<FibreTangent>,
 }
 
 /// The elements of a scene at displacements (m) of its nodes, in the order of its tables, each by itself: with nodal
@@ -44,8 +46,8 @@ pub fn element_tangents<M: Material>(
     scene: SceneView<'_, M>,
     displacement: impl Fn(usize) -> [f64; 3],
 ) -> impl Iterator<Item = ElementTangent> {
-    scene.laws_at_places().map(move |(tile, lane, law)| {
-        ElementTangent::new(&law, tile, lane, |node| DVec3::from_array(displacement(node)))
+    scene.places().map(move |(tile, lane)| {
+        ElementTangent::new(scene, tile, lane, |node| DVec3::from_array(displacement(node)))
     })
 }
 
@@ -61,11 +63,17 @@ impl ElementTangent {
             let [x, y, z] = displacement[node].to_array().map(f64::from);
             DVec3::new(x, y, z)
         };
-        Self::new(&scene.material.laws().of(tile.element(lane)), tile, lane, at)
+        Self::new(scene, tile, lane, at)
     }
 
     /// The same with displacements in float64.
-    fn new<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: impl Fn(usize) -> DVec3) -> Self {
+    fn new<M: Material>(
+        scene: SceneView<'_, M>,
+        tile: &ElementTile,
+        lane: usize,
+        displacement: impl Fn(usize) -> DVec3,
+    ) -> Self {
+        let law = scene.material.laws().of(tile.element(lane));
         let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
         let slopes = [0, 1, 2]
             .map(|corner| DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane)))));
@@ -75,7 +83,9 @@ impl ElementTangent {
             h += outer(displacement(node), gradient);
         }
         let volume = f64::from(tile.volume::<f32>(lane));
-        Self { nodes, gradients, volume, at: LawTangent::new(law, h) }
+        let of_elements = scene.fibrous().filter(|_| !scene.element().is_nodal_strain());
+        let fibres = of_elements.map(|of| of.tangent([place_in(scene.tiles, tile), lane], tile.element(lane), h));
+        Self { nodes, gradients, volume, at: LawTangent::new(&law, h, fibres) }
     }
 
     /// The same with the pressure at another `J - 1`, and without the stiffness of its change.
@@ -127,7 +137,7 @@ impl ElementTangent {
     /// [F (g_i x g_j)]_x`, times the volume. Each part is given as its columns.
     #[must_use]
     pub fn stiffness(&self) -> [[[[f64; 3]; 3]; 4]; 4] {
-        let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, .. } = self.at;
+        let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, fibres, .. } = self.at;
         let along_f = self.gradients.map(|gradient| f * gradient);
         let along_c = self.gradients.map(|gradient| cofactor * gradient);
         from_fn(|i| {
@@ -140,7 +150,11 @@ impl ElementTangent {
                     + outer(y, b * x_f + d * x_c)
                     + outer(a * coupling + c * bulk, d)
                     + outer(c * coupling, b)
-                    - cross_matrix(turning);
+                    - cross_matrix(turning)
+                    + fibres.map_or(DMat3::ZERO, |fibres| {
+                        let along = |axis: DVec3| fibres.stress_by(outer(axis, self.gradients[j])) * self.gradients[i];
+                        DMat3::from_cols(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
+                    });
                 (sum * self.volume).to_cols_array_2d()
             })
         })
@@ -149,7 +163,7 @@ impl ElementTangent {
 
 impl LawTangent {
     /// At the displacement gradient `h`.
-    pub(super) fn new<L: Law>(law: &L, h: DMat3) -> Self {
+    pub(super) fn new<L: Law>(law: &L, h: DMat3, fibres: Option<FibreTangent>) -> Self {
         let f = DMat3::IDENTITY + h;
         let cofactor = cofactor(f);
         let square = inner3(f, f);
@@ -173,6 +187,7 @@ impl LawTangent {
             change,
             x_f: 2.0 * g,
             x_c: slope_g * square,
+            fibres,
         }
     }
 
@@ -192,13 +207,15 @@ impl LawTangent {
             bulk_modulus: 0.0,
             x_f: 0.0,
             x_c: 0.0,
+            fibres: None,
             ..*self
         })
     }
 
     /// The first Piola-Kirchhoff stress, Pa.
     fn stress(&self) -> DMat3 {
-        self.f * self.p1 + self.cofactor * self.p_j
+        let of_fibres = self.fibres.map_or(DMat3::ZERO, |fibres| fibres.stress());
+        self.f * self.p1 + self.cofactor * self.p_j + of_fibres
     }
 
     /// Its change with one of the deformation gradient.
@@ -212,6 +229,7 @@ impl LawTangent {
             + f * (self.coupling * df_c)
             + c * (self.coupling * df_f + self.bulk * df_c)
             + d_cofactor * (0.5 * self.p_j)
+            + self.fibres.map_or(DMat3::ZERO, |fibres| fibres.stress_by(df))
     }
 }
 
@@ -256,9 +274,9 @@ mod tests {
         };
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for (tile, lane) in scene.view().places() {
-            let law = scene.view().material.laws().of(tile.element(lane));
-            let at =
-                |t: f64| ElementTangent::new(&law, tile, lane, |node| 2e-3 * wave(node, 0.3) + t * wave(node, 1.1));
+            let at = |t: f64| {
+                ElementTangent::new(scene.view(), tile, lane, |node| 2e-3 * wave(node, 0.3) + t * wave(node, 1.1))
+            };
             let tangent = at(0.0);
             // The law is evaluated in float32: a step much smaller would be lost in its rounding.
             let h = 2e-6;

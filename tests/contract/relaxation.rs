@@ -80,7 +80,7 @@ fn every_number_of_threads_gives_the_same_bits() {
         let tissues: Vec<TissueValues> = vec![material(element, EXP, &[]).tissues[0]; 2];
         let of_element = (0..body.tets.len()).map(|tet| u16::from(tet > half)).collect();
         let prony = vec![Prony::new(&TERMS).unwrap(), Prony::new(&[[0.5, 0.001]]).unwrap()];
-        let several = VecMaterial { element, law: EXP, tissues, of_element, prony };
+        let several = VecMaterial { element, law: EXP, tissues, of_element, prony, fibres: vec![], directions: vec![] };
         for material in [material(element, EXP, &TERMS), several] {
             let scene = VecScene::build(material, &body.mesh(), &held(&body)).unwrap();
             let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap();

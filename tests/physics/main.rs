@@ -12,6 +12,7 @@ mod alarms;
 mod crushed;
 mod divergence;
 mod elements;
+mod fibres;
 mod follower_pressure;
 mod loads;
 mod measured_energy;

@@ -75,6 +75,8 @@ pub fn at_run_time<M: Material<Law: Into<AnyLaw>>>(material: &M) -> VecMaterial 
             tissues: tissues.to_vec(),
             of_element: of_element.to_vec(),
             prony: material.prony().to_vec(),
+            fibres: material.fibres().to_vec(),
+            directions: material.directions().to_vec(),
         },
     }
 }
