@@ -16,8 +16,9 @@ use core::ops::{Deref, Range};
 use glam::{DMat3, DVec3};
 
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, FibreTangent, FibreTile, MOST_ELEMENTS, MoreEnergy, NodeInertia, PatchBuilder, PatchRow, Patches,
-    Remembered, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
+    ElementFields, ElementMaterial, ElementTile, Elements, FibreTangent, FibreTile, MOST_ELEMENTS, MoreEnergy,
+    NodeInertia, PatchBuilder, PatchRow, Patches, Remembered, VolumeRows, element_energy, element_fields, patch_energy,
+    stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};

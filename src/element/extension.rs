@@ -4,10 +4,10 @@
 //! elements.
 
 use super::deformation::{Deformation, Matrix};
-use super::fibres::Fibrous;
+use super::fibres::{FibreSlopes, Fibrous};
 use super::relaxation::Relaxing;
 use super::tile::{vector_at, write_at};
-use crate::material::LawState;
+use crate::material::{Invariants, LawState};
 use crate::simd::{Real, TILE};
 
 /// See the module.
@@ -18,8 +18,11 @@ pub(crate) trait Extension {
     /// What of the law it needs to know of a vector of elements.
     type Local<R: Real>: Copy;
 
+    /// What the first of two passes finds for the second one.
+    type Prepared<R: Real>: Copy;
+
     /// Of elements at rest.
-    fn at_rest<R: Real>() -> Self::Local<R>;
+    fn at_rest<R: Real>() -> (Self::Local<R>, Self::Prepared<R>);
 
     /// Of elements in this state.
     fn of_law<R: Real>(local: &LawState<R>) -> Self::Local<R>;
@@ -27,8 +30,22 @@ pub(crate) trait Extension {
     /// The modulus of the stabilising energy of nodal strain, Pa, from that of the law.
     fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R;
 
-    /// The first Piola-Kirchhoff stress, Pa, from the law's `p1` and `s` ([`Deformation::stress`]). Called once for each
-    /// vector of elements, those from place `first` of a tile on, of which `element` gives the mesh element in a lane.
+    /// The first of two passes over a few vectors of elements, those from place `first` of a tile on, of which `element`
+    /// gives the mesh element in a lane: a pass of its own, so that a processor can overlap the long sequences of
+    /// dependent operations of several vectors. Gives as well what the scalar stiffness bound gains, Pa, if it is asked for:
+    /// a bound of `dF:A:dF / |dF|^2`.
+    fn prepare<R: Real, T>(
+        &mut self,
+        place: (&T, usize),
+        element: impl Fn(usize) -> usize,
+        h: &Matrix<R>,
+        invariants: Invariants<R>,
+        with_bound: bool,
+        local: &Self::Local<R>,
+    ) -> (Self::Prepared<R>, R);
+
+    /// The first Piola-Kirchhoff stress, Pa, from the law's `p1` and `s` ([`Deformation::stress`]): the second pass, once
+    /// for each vector of elements.
     fn stress<R: Real, T>(
         &mut self,
         place: (&T, usize),
@@ -36,15 +53,8 @@ pub(crate) trait Extension {
         deformation: &Deformation<R>,
         scalars: [R; 2],
         local: &Self::Local<R>,
+        prepared: &Self::Prepared<R>,
     ) -> Matrix<R>;
-
-    /// What the scalar stiffness bound gains of a vector of elements, Pa: a bound of `dF:A:dF / |dF|^2`.
-    fn scalar_bound<R: Real, T>(
-        &self,
-        place: (&T, usize),
-        element: impl Fn(usize) -> usize,
-        deformation: &Deformation<R>,
-    ) -> R;
 
     /// How close elements came to where its laws are continued: above 1 some are beyond.
     fn saturation(&self) -> f32;
@@ -58,9 +68,12 @@ impl Extension for NoExtension {
     const EXTENDS: bool = false;
 
     type Local<R: Real> = ();
+    type Prepared<R: Real> = ();
 
     #[inline(always)]
-    fn at_rest<R: Real>() {}
+    fn at_rest<R: Real>() -> ((), ()) {
+        ((), ())
+    }
 
     #[inline(always)]
     fn of_law<R: Real>(_: &LawState<R>) {}
@@ -71,6 +84,19 @@ impl Extension for NoExtension {
     }
 
     #[inline(always)]
+    fn prepare<R: Real, T>(
+        &mut self,
+        _: (&T, usize),
+        _: impl Fn(usize) -> usize,
+        _: &Matrix<R>,
+        _: Invariants<R>,
+        _: bool,
+        (): &(),
+    ) -> ((), R) {
+        ((), R::splat(0.0))
+    }
+
+    #[inline(always)]
     fn stress<R: Real, T>(
         &mut self,
         _: (&T, usize),
@@ -78,18 +104,9 @@ impl Extension for NoExtension {
         deformation: &Deformation<R>,
         [p1, s]: [R; 2],
         (): &(),
+        (): &(),
     ) -> Matrix<R> {
         deformation.stress(p1, s)
-    }
-
-    #[inline(always)]
-    fn scalar_bound<R: Real, T>(
-        &self,
-        _: (&T, usize),
-        _: impl Fn(usize) -> usize,
-        _: &Deformation<R>,
-    ) -> R {
-        R::splat(0.0)
     }
 
     #[inline(always)]
@@ -146,12 +163,14 @@ impl Extension for Extended<'_> {
     const EXTENDS: bool = true;
 
     type Local<R: Real> = Distortion<R>;
+    type Prepared<R: Real> = FibreSlopes<R>;
 
     #[inline(always)]
-    fn at_rest<R: Real>() -> Distortion<R> {
+    fn at_rest<R: Real>() -> (Distortion<R>, FibreSlopes<R>) {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let slope = R::splat(-2.0 / 3.0);
-        Distortion { scale: zero, factor: one, slope, less_one: zero, change: zero, inverse: one }
+        let local = Distortion { scale: zero, factor: one, slope, less_one: zero, change: zero, inverse: one };
+        (local, FibreSlopes::none())
     }
 
     #[inline(always)]
@@ -170,6 +189,29 @@ impl Extension for Extended<'_> {
     }
 
     #[inline(always)]
+    fn prepare<R: Real, T>(
+        &mut self,
+        (tile, first): (&T, usize),
+        element: impl Fn(usize) -> usize,
+        h: &Matrix<R>,
+        invariants: Invariants<R>,
+        with_bound: bool,
+        local: &Distortion<R>,
+    ) -> (FibreSlopes<R>, R) {
+        let mut bound = R::splat(0.0);
+        let Some(fibres) = &self.fibres else { return (FibreSlopes::none(), bound) };
+        let place = fibres.tile(place_of(self.table, tile));
+        let stretch = fibres.stretch(place, first, element, h, [local.factor, local.less_one]);
+        if with_bound {
+            bound = fibres.scalar_bound(&stretch, local, invariants);
+        }
+        let (slopes, close) = fibres.slopes(&stretch);
+        let saturation = &mut self.saturation;
+        write_at(saturation, first, close.max(vector_at(saturation, first)));
+        (slopes, bound)
+    }
+
+    #[inline(always)]
     fn stress<R: Real, T>(
         &mut self,
         (tile, first): (&T, usize),
@@ -177,16 +219,13 @@ impl Extension for Extended<'_> {
         deformation: &Deformation<R>,
         [p1, mut s]: [R; 2],
         local: &Distortion<R>,
+        prepared: &FibreSlopes<R>,
     ) -> Matrix<R> {
         let mut of_fibres = None;
         if let Some(fibres) = &self.fibres {
             let place = fibres.tile(place_of(self.table, tile));
-            let factor = [local.factor, local.less_one];
-            let stress = fibres.stress(&fibres.stretch(place, first, &element, &deformation.h, factor));
-            let saturation = &mut self.saturation;
-            write_at(saturation, first, stress.saturation.max(vector_at(saturation, first)));
-            s = (local.slope * R::splat(0.5)).fused(stress.inner, s);
-            of_fibres = Some(stress);
+            s = (local.slope * R::splat(0.5)).fused(prepared.inner, s);
+            of_fibres = Some(fibres.stress(place, first, prepared, &deformation.h));
         }
         let mut stress = match &mut self.relaxing {
             Some(of) => of.stress((tile, first), element, deformation, [p1, s], local, of_fibres.as_ref()),
@@ -196,21 +235,6 @@ impl Extension for Extended<'_> {
             fibres.add_to(&mut stress, local.factor);
         }
         stress
-    }
-
-    #[inline(always)]
-    fn scalar_bound<R: Real, T>(
-        &self,
-        (tile, first): (&T, usize),
-        element: impl Fn(usize) -> usize,
-        deformation: &Deformation<R>,
-    ) -> R {
-        match &self.fibres {
-            Some(fibres) => {
-                fibres.bounds(fibres.tile(place_of(self.table, tile)), first, element, deformation).scalar()
-            }
-            None => R::splat(0.0),
-        }
     }
 
     #[inline(always)]

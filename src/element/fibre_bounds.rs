@@ -67,13 +67,7 @@ impl<R: Real> Lengths<R> {
 
     /// What the node with this gradient and weight gets: by Cauchy-Schwarz, as in [`super::critical_bounds`].
     #[inline(always)]
-    fn matrix(
-        &self,
-        bounds: &FibreBounds<R>,
-        deformation: &Deformation<R>,
-        g: Vector<R>,
-        weight: R,
-    ) -> Symmetric<R> {
+    fn matrix(&self, bounds: &FibreBounds<R>, deformation: &Deformation<R>, g: Vector<R>, weight: R) -> Symmetric<R> {
         let share = R::splat(1.0).divide(weight);
         let c = Image::of_cofactor(deformation, g);
         let isotropic = share * bounds.isotropic * dot(g, g).sqrt() * self.own;
@@ -169,8 +163,7 @@ impl OfPatches<'_, '_> {
         let zero = R::splat(0.0);
         let at_rest = Deformation::new([[zero; 3]; 3]);
         let none = fibres.bounds(&FibreTile::EMPTY, 0, |_| usize::MAX, &at_rest);
-        let none =
-            OfPatch { deformation: at_rest, bounds: none, lengths: Lengths::zero(), root: zero, own: [zero; 3] };
+        let none = OfPatch { deformation: at_rest, bounds: none, lengths: Lengths::zero(), root: zero, own: [zero; 3] };
         for (number, tile) in patches.tiles().iter().enumerate() {
             let neighbours = patches.neighbours_of(tile);
             let mut deformations = [at_rest; PARTS];
@@ -261,7 +254,7 @@ fn add_tangent(bounds: &FibreBounds<f32>, weight: f32, tangent: &mut Tangent) {
         *outer += weight * volume;
         *exchanged += weight * (0.5 * shear);
     } else {
-        *first += weight * bounds.scalar_of_shape();
+        *first += weight * bounds.of_shape();
         *outer += weight * bounds.volume;
     }
 }

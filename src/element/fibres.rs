@@ -13,6 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 
 use super::deformation::{Deformation, Matrix, Vector};
+use super::extension::Distortion;
 use super::tile::vector_at;
 use crate::material::{Directions, FIBRE_TERMS, FibreTerm, Fibres, Invariants, VolumeFactor};
 use crate::simd::{Real, TILE, dot};
@@ -81,7 +82,8 @@ impl MeanDirections {
 
     pub(crate) fn add(&mut self, directions: [DVec3; FAMILIES], volume: f64) {
         for (sum, direction) in self.0.iter_mut().zip(directions) {
-            *sum += DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z) * volume;
+            *sum +=
+                DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z) * volume;
         }
     }
 
@@ -96,7 +98,9 @@ impl MeanDirections {
                 sum = sum * sum;
             }
             let columns = [sum.x_axis, sum.y_axis, sum.z_axis];
-            columns.into_iter().fold(DVec3::ZERO, |most, column| if column.length() > most.length() { column } else { most })
+            columns
+                .into_iter()
+                .fold(DVec3::ZERO, |most, column| if column.length() > most.length() { column } else { most })
         });
         let fibre = fibre.normalize_or_zero();
         let sheet = (sheet - fibre * fibre.dot(sheet)).normalize_or_zero();
@@ -131,17 +135,33 @@ pub(super) struct Stretch<R> {
     terms: [FibreTerm<R>; FIBRE_TERMS],
 }
 
-/// The stress of fibres: `g (m_f b_f^T + m_s b_s^T) + g' across / 2 C`.
+/// Scalars of the stress of fibres.
+#[derive(Clone, Copy)]
+pub(crate) struct FibreSlopes<R> {
+    /// `2 phi'` of the families, and `phi'` of the term of both, Pa.
+    slopes: [R; FIBRE_TERMS],
+    /// `B:C`, Pa, with `B = 2 dW/dC` (isochoric).
+    pub(super) inner: R,
+}
+
+impl<R: Real> FibreSlopes<R> {
+    #[inline(always)]
+    pub(super) fn none() -> Self {
+        let zero = R::splat(0.0);
+        Self { slopes: [zero; FIBRE_TERMS], inner: zero }
+    }
+}
+
+/// The stress of fibres: `g (m_f b_f^T + m_s b_s^T) + g' B:C / 2 C`.
 #[derive(Clone, Copy)]
 pub(super) struct FibreStress<R> {
     directions: [Vector<R>; FAMILIES],
     images: [Vector<R>; FAMILIES],
-    /// Columns of `B = 2 dW/dC` (isochoric), Pa: `B = f b_f^T + s b_s^T`.
+    /// Columns of `B = f b_f^T + s b_s^T`, Pa.
     across: [Vector<R>; FAMILIES],
     /// `B:C`, Pa.
     pub(super) inner: R,
-    /// How close to where the law is continued.
-    pub(super) saturation: R,
+    families: usize,
 }
 
 impl<'a> Fibrous<'a> {
@@ -226,28 +246,102 @@ impl<'a> Fibrous<'a> {
         stretch
     }
 
-    /// The stress of [`Fibrous::stretch`].
+    /// The scalars of the stress, and how close the law is to where it is continued.
     #[inline(always)]
-    pub(super) fn stress<R: Real>(&self, stretch: &Stretch<R>) -> FibreStress<R> {
-        let zero = R::splat(0.0);
-        let Stretch { directions, images, products, x, terms } = stretch;
-        let mut slopes = [zero; FIBRE_TERMS];
-        let [slope, mut saturation] = terms[0].slope(x[0]);
-        slopes[0] = slope + slope;
+    pub(super) fn slopes<R: Real>(&self, stretch: &Stretch<R>) -> (FibreSlopes<R>, R) {
+        let Stretch { products, x, terms, .. } = stretch;
+        let mut all = FibreSlopes::none();
+        let [slope, mut close] = terms[0].slope(x[0]);
+        all.slopes[0] = slope + slope;
+        all.inner = all.slopes[0] * products[0];
         if self.families == FAMILIES {
             let [slope, of_sheets] = terms[1].slope(x[1]);
             let [shear, of_both] = terms[2].slope(x[2]);
-            (slopes[1], slopes[2]) = (slope + slope, shear);
-            saturation = saturation.max(of_sheets.max(of_both));
+            (all.slopes[1], all.slopes[2]) = (slope + slope, shear);
+            let of_coupling = (shear + shear).fused(products[2], all.inner);
+            all.inner = all.slopes[1].fused(products[1], of_coupling);
+            close = close.max(of_sheets.max(of_both));
         }
-        let mut across = [[zero; 3]; FAMILIES];
-        for axis in 0..3 {
-            let [f, s] = [directions[0][axis], directions[1][axis]];
-            across[0][axis] = slopes[0].fused(f, slopes[2] * s);
-            across[1][axis] = slopes[1].fused(s, slopes[2] * f);
+        (all, close)
+    }
+
+    /// A bound of `dF:A:dF / |dF|^2` (Pa) that takes little time: with `|C|^2 <= I1^2 / 3`, `|dF:dC/dF:dF| <= (I1 / 3 + 1)
+    /// |dF|^2`, and with `M = |m_p| + |m_q|` `2 M |C| <= c M^2 + |C|^2 / c`, where `M^2 <= 2 |m_p|^2 + 2 |m_q|^2`.
+    #[inline(always)]
+    pub(super) fn scalar_bound<R: Real>(
+        &self,
+        stretch: &Stretch<R>,
+        local: &Distortion<R>,
+        invariants: Invariants<R>,
+    ) -> R {
+        /// `|C| / M` at rest.
+        const RATIO: f32 = 0.866_025_4;
+        let (one, two, third) = (R::splat(1.0), R::splat(2.0), R::splat(1.0 / 3.0));
+        let (g, dg) = (local.factor, local.slope);
+        let steep = dg.abs();
+        let i1 = invariants.i + R::splat(3.0);
+        let cofactor = i1 * i1 * third;
+        let reach = i1.fused(third, one);
+        let ddg = R::splat(10.0 / 9.0) * g * (local.inverse * local.inverse);
+        let volume_ratio = one + invariants.j;
+        let mut bound = R::splat(0.0);
+        for term in 0..FIBRE_TERMS {
+            if term > 0 && self.families < FAMILIES {
+                break;
+            }
+            let [p, q] = PAIRS[term];
+            let [slope, curvature] = stretch.terms[term].slope_and_curvature(stretch.x[term]);
+            let product = stretch.products[term];
+            let squares = stretch.products[p] + stretch.products[q];
+            let along_c = dg * product;
+            let same = if p == q { two } else { R::splat(0.0) };
+            // |X|^2.
+            let square = (g * g).fused(
+                same.fused(product, squares),
+                along_c * (two * g * same).fused(volume_ratio, along_c * cofactor),
+            );
+            let size = product.abs();
+            let mixed = steep * R::splat(RATIO).fused(squares + squares, cofactor * R::splat(1.0 / RATIO));
+            let geometric = two.fused(g, (steep * size).fused(reach, ddg * size * cofactor)) + mixed;
+            bound = curvature.fused(square, slope.abs().fused(geometric, bound));
         }
-        let inner = slopes[0].fused(products[0], slopes[1].fused(products[1], (slopes[2] + slopes[2]) * products[2]));
-        FibreStress { directions: *directions, images: *images, across, inner, saturation }
+        bound
+    }
+
+    /// The stress from its scalars.
+    #[inline(always)]
+    pub(super) fn stress<R: Real>(
+        &self,
+        tile: &FibreTile,
+        first: usize,
+        scalars: &FibreSlopes<R>,
+        h: &Matrix<R>,
+    ) -> FibreStress<R> {
+        let none = [R::splat(0.0); 3];
+        let FibreSlopes { slopes, inner, .. } = *scalars;
+        let mut stress = FibreStress {
+            directions: [none; FAMILIES],
+            images: [none; FAMILIES],
+            across: [none; FAMILIES],
+            inner,
+            families: self.families,
+        };
+        for family in 0..self.families.min(FAMILIES) {
+            let direction = tile.direction::<R>(family, first);
+            for axis in 0..3 {
+                stress.images[family][axis] = direction[axis] + dot(h[axis], direction);
+                stress.across[family][axis] = slopes[family] * direction[axis];
+            }
+            stress.directions[family] = direction;
+        }
+        if self.families == FAMILIES {
+            for axis in 0..3 {
+                let [f, s] = [stress.directions[0][axis], stress.directions[1][axis]];
+                stress.across[0][axis] = slopes[2].fused(s, stress.across[0][axis]);
+                stress.across[1][axis] = slopes[2].fused(f, stress.across[1][axis]);
+            }
+        }
+        stress
     }
 
     /// Bounds of the stiffness of a vector of elements or patches.
@@ -307,7 +401,7 @@ impl<R: Real> FibreStress<R> {
     /// Adds `F B` times `g` to a stress, Pa.
     #[inline(always)]
     pub(super) fn add_to(&self, stress: &mut Matrix<R>, g: R) {
-        for family in 0..FAMILIES {
+        for family in 0..self.families.min(FAMILIES) {
             let [x, y, z] = self.across[family];
             let across = [g * x, g * y, g * z];
             for i in 0..3 {
@@ -341,8 +435,6 @@ pub(super) struct FibreBounds<R> {
     along_c: [R; FIBRE_TERMS],
     /// `|X|^2` of each term.
     squares: [R; FIBRE_TERMS],
-    /// `|C|^2`.
-    cofactor: R,
     /// In the bound that rotations do not feel: of `|D|^2`, `(tr D)^2` and `|L|^2`, with `L = dF F^-1`.
     pub(super) spatial: [R; 3],
 }
@@ -377,7 +469,6 @@ impl<R: Real> FibreBounds<R> {
             g,
             along_c: [zero; FIBRE_TERMS],
             squares: [zero; FIBRE_TERMS],
-            cofactor,
             spatial: [zero; 3],
         };
         for term in 0..FIBRE_TERMS {
@@ -423,19 +514,13 @@ impl<R: Real> FibreBounds<R> {
         image
     }
 
-    /// All in one: a bound of `dF:A:dF / |dF|^2`, Pa.
+    /// `isotropic` with the stiffening: all but the volume's part.
     #[inline(always)]
-    pub(super) fn scalar(&self) -> R {
-        let mut sum = self.volume.fused(self.cofactor, self.isotropic);
+    pub(super) fn of_shape(&self) -> R {
+        let mut sum = self.isotropic;
         for term in 0..FIBRE_TERMS {
             sum = self.stiffening[term].fused(self.squares[term], sum);
         }
         sum
-    }
-
-    /// The same without the volume's part.
-    #[inline(always)]
-    pub(super) fn scalar_of_shape(&self) -> R {
-        self.scalar() - self.volume * self.cofactor
     }
 }

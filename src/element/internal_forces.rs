@@ -147,7 +147,11 @@ impl<L: Law, V: ElementVisitor, P: Pressure, K: Extension> Kernel for InternalFo
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        if R::COUNT > 8 { in_batches::<R, L, V, P, K, WIDE_BATCH>(self) } else { in_batches::<R, L, V, P, K, BATCH>(self) }
+        if R::COUNT > 8 {
+            in_batches::<R, L, V, P, K, WIDE_BATCH>(self)
+        } else {
+            in_batches::<R, L, V, P, K, BATCH>(self)
+        }
     }
 
     #[inline(always)]
@@ -160,7 +164,8 @@ impl<L: Law, V: ElementVisitor, P: Pressure, K: Extension> Kernel for InternalFo
 fn in_batches<R: Real, L: Law, V: ElementVisitor, P: Pressure, K: Extension, const SIZE: usize>(
     kernel: InternalForces<'_, L, V, P, K>,
 ) -> Extremes<f32> {
-    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, visitor, extension } = kernel;
+    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, visitor, extension } =
+        kernel;
     let Elements { laws, tiles, partitions: all } = elements;
     let displacement = pressure.displacement().unwrap_or(displacement);
     let (mut extremes, mut asked) = (Extremes::<Pair<R>>::none(), (visitor, extension));
@@ -243,12 +248,17 @@ pub(crate) fn add_forces<R: Real, L: Law, V: ElementVisitor, P: Pressure, K: Ext
                 visit::<R, L>(laws, elements, local, visitor);
             }
             for (kept, local) in kept.iter_mut().skip(2 * index).zip(&locals) {
-                *kept = K::of_law(local);
+                kept.0 = K::of_law(local);
             }
         }
         if K::EXTENDS {
             let batch = batch.get_mut(..count).unwrap_or_default();
-            R::run_piece(Extend::<_, V, _> { batch, kept: &kept, extension: &mut *extension, visitor: PhantomData });
+            R::run_piece(Extend::<_, V, _> {
+                batch,
+                kept: &mut kept,
+                extension: &mut *extension,
+                visitor: PhantomData,
+            });
         }
         let batch = batch.get(..count).unwrap_or_default();
         let force = force.reborrow();
@@ -372,7 +382,7 @@ fn visit<R: Real, L: Law>(
 /// Between the second and the third pass, for tissue with an extension: its stress takes the place of `h`.
 struct Extend<'a, 'b, R: Real, V, K: Extension> {
     batch: &'a mut [ElementVector<'b, R>],
-    kept: &'a [K::Local<R>],
+    kept: &'a mut [(K::Local<R>, K::Prepared<R>)],
     extension: &'a mut K,
     visitor: PhantomData<V>,
 }
@@ -383,15 +393,20 @@ impl<R: Real, V: ElementVisitor, K: Extension> Piece for Extend<'_, '_, R, V, K>
     #[inline(always)]
     fn run(self) {
         let Self { batch, kept, extension, .. } = self;
-        for (elements, local) in batch.iter_mut().zip(kept) {
+        for (elements, (local, prepared)) in batch.iter_mut().zip(&mut *kept) {
+            let ElementVector { tile, first, h, invariants, .. } = *elements;
+            let element = |lane: usize| tile.element(first + lane);
+            let bound;
+            (*prepared, bound) = extension.prepare((tile, first), element, &h, invariants, V::BOUNDS, local);
+            if V::BOUNDS {
+                elements.fourth = scale_of::<R>(tile, first).fused(bound, elements.fourth);
+            }
+        }
+        for (elements, (local, prepared)) in batch.iter_mut().zip(&*kept) {
             let ElementVector { tile, first, p1, s, .. } = *elements;
             let deformation = Deformation::with(elements.h, elements.invariants);
             let element = |lane: usize| tile.element(first + lane);
-            if V::BOUNDS {
-                let bound = extension.scalar_bound((tile, first), element, &deformation);
-                elements.fourth = scale_of::<R>(tile, first).fused(bound, elements.fourth);
-            }
-            elements.h = extension.stress((tile, first), element, &deformation, [p1, s], local);
+            elements.h = extension.stress((tile, first), element, &deformation, [p1, s], local, prepared);
         }
     }
 }

@@ -7,8 +7,8 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::internal_forces::ElementVisitor;
 use super::{
-    CriticalBounds, ElementTangents, Extended, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure, PatchBounds,
-    PatchForces, PatchTangents, ScalarBound, TileTangents,
+    CriticalBounds, ElementTangents, Extended, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure,
+    PatchBounds, PatchForces, PatchTangents, ScalarBound, TileTangents,
 };
 
 /// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,

@@ -62,21 +62,19 @@ pub(crate) use crushed::{
     CrushedElements, LOOK_CYCLE, LOOK_CYCLE_OF_LONG, Look, MARKED, each_marked, forget_crushed, is_marked_at,
     mark_moment, mask_of, masks, masks_mut,
 };
-pub(crate) use fields::{MoreEnergy, element_energy, element_fields, patch_energy, stabilising_energy};
-pub(crate) use fibre_bounds::{
-    add_fibre_bounds, add_fibre_tangents, add_patch_fibre_bounds, add_patch_fibre_tangents,
-};
+#[cfg(feature = "std")]
+pub(crate) use extension::place_in;
+pub(crate) use extension::{Extended, NoExtension};
+pub(crate) use fibre_bounds::{add_fibre_bounds, add_fibre_tangents, add_patch_fibre_bounds, add_patch_fibre_tangents};
 pub(crate) use fibre_tangent::FibreTangent;
 pub(crate) use fibres::{Fibrous, unit_directions};
+pub(crate) use fields::{MoreEnergy, element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
 pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
-#[cfg(feature = "std")]
-pub(crate) use extension::place_in;
-pub(crate) use extension::{Extended, NoExtension};
 pub(crate) use relaxation::{Relaxing, Series, VECTORS_OF_TERM};
 pub(crate) use relaxation_energy::Remembered;
 pub(crate) use stiffness_bound::ScalarBound;

@@ -5,8 +5,8 @@
 use bytemuck::{must_cast_mut, must_cast_slice_mut};
 use glam::DVec3;
 
-use super::fibres::{FibreTile, MeanDirections};
 use super::ElementTile;
+use super::fibres::{FibreTile, MeanDirections};
 use super::patch::{Neighbours, PatchLayout, PatchRow, PatchTile, ROW_WORDS};
 use crate::heap_sort::sort;
 use crate::mesh::partition::{Partitions, most_groups};

@@ -135,7 +135,9 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
     let modulus = modulus_of::<R, L>(&law);
     let (place, element) = ((tile, first), |lane| tile.element(first + lane));
     let stabilising = extension.stabilising(modulus, element);
-    let mut p = extension.stress(place, element, &deformation, [response.p1, response.s], &K::of_law(&local));
+    let (scalars, of_law) = ([response.p1, response.s], K::of_law(&local));
+    let (prepared, bound) = extension.prepare(place, element, &h, deformation.invariants, V::BOUNDS, &of_law);
+    let mut p = extension.stress(place, element, &deformation, scalars, &of_law, &prepared);
     for i in 0..3 {
         for j in 0..3 {
             p[i][j] = p[i][j] - stabilising * h[i][j];
@@ -151,7 +153,7 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
     let coefficients = Coefficients::new::<L>(&law, &local).less(modulus);
     let mut scalar = scalar_bound_of_patches(&coefficients, &deformation, scale);
     if K::EXTENDS {
-        scalar = scale.fused(extension.scalar_bound(place, element, &deformation), scalar);
+        scalar = scale.fused(bound, scalar);
     }
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }

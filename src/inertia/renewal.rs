@@ -18,8 +18,8 @@ use super::pulls::PullsInUse;
 use super::report::AddedInertia;
 use super::{COARSE_GROWTH, DRAG_AT_LARGEST_CHANGE, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::element::{
-    add_fibre_tangents, add_patch_fibre_tangents, CrushedTangents, ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent,
-    each_bounded, tangents,
+    CrushedTangents, ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent,
+    add_fibre_tangents, add_patch_fibre_tangents, each_bounded, tangents,
 };
 use crate::mesh::partition::MOST_PARTS;
 use crate::scene::SceneView;

@@ -82,7 +82,8 @@ impl<const N: usize, const T: usize, const P: usize, const F: usize> SceneTables
 /// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`](super::tiles_for)), with nodal strain of at
 /// most `P` rows of patches ([`patch_rows_for`](super::patch_rows_for)), with fibres of at most `F` tiles of directions
 /// ([`fibre_tiles_for`](super::fibre_tiles_for)), which may be a `static`.
-pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0, const F: usize = 0> = Scene<M, FixedTables<N, T, P, F>>;
+pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0, const F: usize = 0> =
+    Scene<M, FixedTables<N, T, P, F>>;
 
 impl<M, const N: usize, const T: usize, const P: usize, const F: usize> FixedScene<M, N, T, P, F> {
     /// An empty scene.

@@ -6,8 +6,8 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extended, Extremes, Fibrous,
-    ForcesVisitor, InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NoExtension, NodalVolumes, NodeInertia, OwnPressure,
+    AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extended, Extremes, Fibrous, ForcesVisitor,
+    InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NoExtension, NodalVolumes, NodeInertia, OwnPressure,
     PatchForces, Relaxing, Series, each_marked, is_marked_at, mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};

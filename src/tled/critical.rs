@@ -5,8 +5,7 @@
 
 use crate::element::{
     CriticalBounds, ElementLaw, ElementMaterial, MeanPressure, NodalVolumeBounds, NodeInertia, NodeMatrices,
-    OwnPressure, PatchBounds, VolumeRows, add_crushed_bounds, add_fibre_bounds,
-    add_patch_fibre_bounds, balance, weigh,
+    OwnPressure, PatchBounds, VolumeRows, add_crushed_bounds, add_fibre_bounds, add_patch_fibre_bounds, balance, weigh,
 };
 use crate::material::{Law, Laws, Potential};
 use crate::scene::{AsScene, SceneView};

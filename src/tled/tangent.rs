@@ -46,9 +46,9 @@ pub fn element_tangents<M: Material>(
     scene: SceneView<'_, M>,
     displacement: impl Fn(usize) -> [f64; 3],
 ) -> impl Iterator<Item = ElementTangent> {
-    scene.places().map(move |(tile, lane)| {
-        ElementTangent::new(scene, tile, lane, |node| DVec3::from_array(displacement(node)))
-    })
+    scene
+        .places()
+        .map(move |(tile, lane)| ElementTangent::new(scene, tile, lane, |node| DVec3::from_array(displacement(node))))
 }
 
 impl ElementTangent {

@@ -33,7 +33,15 @@ fn the_end_is_that_of_a_body_that_was_so_from_the_start() {
             region.iter().for_each(|&element| of_element[element as usize] = 1);
             let values = |law: NeoHookean| TissueValues { constants: AnyLaw::from(law).values(), density: DENSITY };
             let tissues = vec![values(SOFT), values(law)];
-            let material = VecMaterial { element, law: law.into(), tissues, of_element, prony: vec![], fibres: vec![], directions: vec![] };
+            let material = VecMaterial {
+                element,
+                law: law.into(),
+                tissues,
+                of_element,
+                prony: vec![],
+                fibres: vec![],
+                directions: vec![],
+            };
             let supports: Vec<_> = (0..25).map(Support::fixed).collect();
             let from_start = Simulation::new(BAR.points(), BAR.tets(), material, &supports).unwrap();
             let from_start = at_rest_under_gravity(from_start.with(settings(method, 30.0)), 2.2);

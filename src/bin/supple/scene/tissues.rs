@@ -99,7 +99,15 @@ impl Tissues {
         let law = self.tissues[0].law;
         let tissues = self.tissues.iter().map(Tissue::values).collect();
         let prony = if self.relax() { self.prony.clone() } else { vec![] };
-        VecMaterial { element, law, tissues, of_element: self.of_element.clone(), prony, fibres: vec![], directions: vec![] }
+        VecMaterial {
+            element,
+            law,
+            tissues,
+            of_element: self.of_element.clone(),
+            prony,
+            fibres: vec![],
+            directions: vec![],
+        }
     }
 }
 
