@@ -10,6 +10,8 @@ mod constants;
 mod fibres;
 mod memory;
 mod owned;
+#[cfg(feature = "std")]
+mod wall;
 
 use core::ops::{Deref, Range};
 
@@ -35,6 +37,8 @@ use memory::terms_of;
 pub use owned::{FixedScene, FixedTables, Scene, SceneTables};
 #[cfg(any(feature = "std", test))]
 pub use owned::{VecScene, VecTables};
+#[cfg(feature = "std")]
+pub use wall::{Wall, WallError};
 
 /// A node that does not move freely along some axes: it stands still, or follows a
 /// [`Motion`](crate::loads::Motion).

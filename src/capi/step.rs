@@ -133,7 +133,7 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
             }
             Cause::NoContact => SUPPLE_E_NO_CONTACT.into(),
             Cause::NoPulls => SUPPLE_E_NO_PULLS.into(),
-            Cause::NoRelaxation => SUPPLE_E_NO_RELAXATION.into(),
+            Cause::NoRelaxation | Cause::NoFibres => SUPPLE_E_NO_RELAXATION.into(),
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }

@@ -18,6 +18,7 @@ mod write;
 
 use std::ffi::OsStr;
 use std::path::Path;
+use std::string::String;
 use std::vec::Vec;
 
 use error::Fault;
@@ -40,6 +41,18 @@ pub struct TetMesh {
     /// is named like `region`, `material`, `PhysicalIds`, `CellEntityIds` or `gmsh:physical`. TetGen: the last
     /// attribute, if it is a whole number everywhere.
     pub regions: Vec<i32>,
+    /// Vectors by tetrahedron, such as the directions of fibres. VTK: the arrays of real numbers with three components
+    /// among the cell data; other formats have none.
+    pub vectors: Vec<CellVectors>,
+}
+
+/// An array of vectors, one for each tetrahedron.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CellVectors {
+    /// Its name.
+    pub name: String,
+    /// The vectors, as the file has them.
+    pub values: Vec<[f64; 3]>,
 }
 
 /// Reads a mesh; the extension tells the format.

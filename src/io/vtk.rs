@@ -7,11 +7,11 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
 use super::values::{Scalar, Values, read_values};
 use super::vtk_cells::{Cells, names_regions};
+use super::{CellVectors, TetMesh};
 
 const MAGIC: &[u8] = b"# vtk DataFile Version ";
 
@@ -26,7 +26,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
             return Err(cursor.fault(format_args!("{} where ASCII or BINARY is expected", quoted(other))));
         }
     };
-    let mut file = Legacy { cursor, encoding, points: None, cells: None, types: None, regions: None };
+    let mut file =
+        Legacy { cursor, encoding, points: None, cells: None, types: None, regions: None, vectors: Vec::new() };
     file.read_sections(major)?;
     file.finish()
 }
@@ -61,6 +62,7 @@ struct Legacy<'a> {
     cells: Option<(Vec<i64>, Vec<i64>, String)>,
     types: Option<Vec<i64>>,
     regions: Option<Vec<i64>>,
+    vectors: Vec<CellVectors>,
 }
 
 impl<'a> Legacy<'a> {
@@ -152,7 +154,8 @@ impl<'a> Legacy<'a> {
         self.whole_values(Some(n), scalar, name)
     }
 
-    /// An array of point or cell data, or of the whole grid. Only regions are kept; the rest is stepped over.
+    /// An array of point or cell data, or of the whole grid. Regions and vectors of cells are kept; the rest is stepped
+    /// over.
     fn read_attribute(&mut self, keyword: &[u8], owner: &Owner) -> Result<(), Fault> {
         let tuples = match *owner {
             Owner::Points(n) | Owner::Cells(n) => n,
@@ -230,13 +233,15 @@ impl<'a> Legacy<'a> {
         owner: &Owner,
     ) -> Result<(), Fault> {
         let values = self.values(tuples.checked_mul(components), scalar, name)?;
-        if let Values::Whole(values) = values
-            && matches!(owner, Owner::Cells(_))
-            && components == 1
-            && names_regions(name)
-            && self.regions.is_none()
-        {
-            self.regions = Some(values);
+        match values {
+            _ if !matches!(owner, Owner::Cells(_)) => {}
+            Values::Whole(values) if components == 1 && names_regions(name) && self.regions.is_none() => {
+                self.regions = Some(values);
+            }
+            values @ Values::Real(_) if components == 3 => {
+                self.vectors.push(CellVectors { name: name.into(), values: values.into_points() });
+            }
+            _ => {}
         }
         Ok(())
     }
@@ -311,7 +316,7 @@ impl<'a> Legacy<'a> {
         let points = self.points.ok_or_else(|| missing("POINTS"))?;
         let (ends, connectivity, place) = self.cells.ok_or_else(|| missing("CELLS"))?;
         let types = self.types.ok_or_else(|| missing("CELL_TYPES"))?;
-        let cells = Cells { types, ends, connectivity, regions: self.regions };
+        let cells = Cells { types, ends, connectivity, regions: self.regions, vectors: self.vectors };
         let mut mesh = TetMesh::default();
         cells.add_to(&mut mesh, 0, points.len()).map_err(|reason| Fault::new(place, reason))?;
         mesh.points = points;

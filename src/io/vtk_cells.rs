@@ -5,7 +5,7 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::TetMesh;
+use super::{CellVectors, TetMesh};
 
 const TRIANGLE: i64 = 5;
 const TETRAHEDRON: i64 = 10;
@@ -38,6 +38,8 @@ pub(super) struct Cells {
     pub(super) connectivity: Vec<i64>,
     /// The region of every cell, if the file has one.
     pub(super) regions: Option<Vec<i64>>,
+    /// Vectors of every cell.
+    pub(super) vectors: Vec<CellVectors>,
 }
 
 impl Cells {
@@ -52,6 +54,8 @@ impl Cells {
         {
             return Err(format!("{} regions for {} cells", regions.len(), self.types.len()));
         }
+        let first_tet = mesh.tets.len();
+        let mut places = Vec::new();
         let mut start = 0;
         for (cell, (&kind, &end)) in self.types.iter().zip(&self.ends).enumerate() {
             let nodes = usize::try_from(start).ok().zip(usize::try_from(end).ok());
@@ -65,6 +69,7 @@ impl Cells {
             match kind {
                 TETRAHEDRON => {
                     mesh.tets.push(corners(cell, "tetrahedron", nodes, first_point, points)?);
+                    places.push(cell);
                     if let Some(&region) = self.regions.as_ref().and_then(|regions| regions.get(cell)) {
                         let region = i32::try_from(region)
                             .map_err(|_| format!("the region {region} of cell {cell} exceeds 32 bits"))?;
@@ -79,6 +84,20 @@ impl Cells {
                         name(other)
                     ));
                 }
+            }
+        }
+        for CellVectors { name, values } in &self.vectors {
+            if values.len() != self.types.len() {
+                return Err(format!("{} vectors {name:?} for {} cells", values.len(), self.types.len()));
+            }
+            let of_tets = places.iter().filter_map(|&cell| values.get(cell).copied());
+            match mesh.vectors.iter_mut().find(|vectors| vectors.name == *name) {
+                Some(vectors) => vectors.values.extend(of_tets),
+                // One that earlier pieces do not have cannot be one of all.
+                None if first_tet == 0 => {
+                    mesh.vectors.push(CellVectors { name: name.clone(), values: of_tets.collect() });
+                }
+                None => {}
             }
         }
         Ok(())

@@ -11,12 +11,12 @@ use std::vec::Vec;
 
 use roxmltree::{Document, Node};
 
-use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
 use super::values::{Scalar, Values, read_values};
 use super::vtk_cells::{Cells, names_regions};
 use super::vtu_data::{Base64, Layout, Source};
+use super::{CellVectors, TetMesh};
 
 pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
     let (head, appended) = split_appended(bytes);
@@ -34,6 +34,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
         // Some pieces have regions, others have not.
         mesh.regions.clear();
     }
+    let tets = mesh.tets.len();
+    mesh.vectors.retain(|vectors| vectors.values.len() == tets);
     Ok(mesh)
 }
 
@@ -135,7 +137,8 @@ impl<'d> Vtu<'d> {
         };
         let connectivity = self.cell_array(node, "connectivity", entries)?;
         let regions = self.read_regions(piece, n_cells)?;
-        let cells = Cells { types, ends, connectivity, regions };
+        let vectors = self.read_vectors(piece, n_cells)?;
+        let cells = Cells { types, ends, connectivity, regions, vectors };
         let first_point = mesh.points.len();
         cells.add_to(mesh, first_point, points.len()).map_err(|reason| self.fault(node, reason))?;
         mesh.points.extend(points);
@@ -160,6 +163,21 @@ impl<'d> Vtu<'d> {
             }
         }
         Ok(None)
+    }
+
+    fn read_vectors(&self, piece: Node<'d, '_>, n_cells: usize) -> Result<Vec<CellVectors>, Fault> {
+        let mut vectors = Vec::new();
+        let data = piece.children().find(|node| node.has_tag_name("CellData"));
+        for node in data.iter().flat_map(Node::children) {
+            if let Some(name) = node.attribute("Name")
+                && node.attribute("NumberOfComponents") == Some("3")
+                && node.attribute("type").is_some_and(|kind| kind.starts_with("Float"))
+            {
+                let values = self.array(node, n_cells.checked_mul(3))?.into_points();
+                vectors.push(CellVectors { name: name.into(), values });
+            }
+        }
+        Ok(vectors)
     }
 
     /// The `n` values of a `<DataArray>`; `n` is `None` where the count itself overflows.

@@ -22,7 +22,7 @@ pub(super) struct Learned<'a, 'w, T> {
 }
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
-    const RELAXES: bool = false;
+    const KNOWS_ALL_TISSUE: bool = false;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let (network, step, inertia) = (self.network, self.step, trial.scene.inertia);

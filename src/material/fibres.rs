@@ -108,6 +108,17 @@ impl Fibres {
     }
 }
 
+/// For people.
+impl fmt::Display for Fibres {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let terms = self.terms.iter().zip(TERMS).filter(|([a, _], _)| *a > 0.0);
+        for (place, ([a, b], name)) in terms.enumerate() {
+            write!(f, "{}{name} a {a} Pa, b {b}", if place > 0 { ", " } else { "" })?;
+        }
+        Ok(())
+    }
+}
+
 /// One term of the energy, for scalars or vectors.
 #[derive(Clone, Copy)]
 pub(crate) struct FibreTerm<R> {

@@ -58,6 +58,8 @@ pub enum Cause {
     /// The tissue relaxes, which learned steps do not know, others only with room for what it remembers
     /// ([`StateView::remembering`](crate::state::StateView::remembering)).
     NoRelaxation,
+    /// The tissue has fibres, which learned steps do not know.
+    NoFibres,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
         /// How far, m.
@@ -119,6 +121,12 @@ impl fmt::Display for Divergence {
                     f,
                     "stopped at {time:.6} s: the tissue relaxes (prony), which this step does not know, or has no room for \
                      what it remembers"
+                )
+            }
+            Cause::NoFibres => {
+                write!(
+                    f,
+                    "stopped at {time:.6} s: the tissue has fibres, which learned steps do not know: take exact or long ones"
                 )
             }
             Cause::Motion { metre, size } => write!(

@@ -130,8 +130,8 @@ pub(crate) trait StepMethod<M> {
         true
     }
 
-    /// Whether tissue relaxes in this step as it does with time.
-    const RELAXES: bool = true;
+    /// Whether it knows all that tissue may have: memory and fibres.
+    const KNOWS_ALL_TISSUE: bool = true;
 
     /// Whether it has had all the time to relax.
     const IS_RELAXED: bool = false;
@@ -209,9 +209,12 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoPulls });
         }
+        if !C::KNOWS_ALL_TISSUE && self.scene.fibrous().is_some() {
+            return Status::Diverged(Divergence { time: self.progress.time, node: 0, cause: Cause::NoFibres });
+        }
         let needed = self.scene.memory_vectors();
         if needed > 0 {
-            if !C::RELAXES || self.memory.len() < needed {
+            if !C::KNOWS_ALL_TISSUE || self.memory.len() < needed {
                 let time = self.progress.time;
                 return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoRelaxation });
             }

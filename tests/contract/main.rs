@@ -9,6 +9,7 @@ mod reference;
 mod support;
 
 mod errors;
+mod fibres;
 mod no_allocation;
 mod parts;
 mod patches;

@@ -54,8 +54,9 @@ fn any_memory_gives_the_same_bits() {
     let (mut nodes, mut tiles) = ([NodeInertia::EMPTY; 100], [ElementTile::EMPTY; 20]);
     let mut rows = [PatchRow::EMPTY; ROWS];
     let supports = held(&body).into_iter();
-    let facts = SceneFacts::build(&material, &body.mesh(), supports, &mut nodes, &mut tiles, &mut rows).unwrap();
-    let view = SceneView::new(&material, &nodes, &tiles, &rows, &facts);
+    let facts =
+        SceneFacts::build(&material, &body.mesh(), supports, &mut nodes, &mut tiles, &mut rows, &mut []).unwrap();
+    let view = SceneView::new(&material, &nodes, &tiles, &rows, &[], &facts);
     assert!(moved(view, VecState::at_rest(96)) == expected);
     // Those who have no patches have no memory for them.
     assert_eq!(size_of::<FixedScene<(), 100, 20, ROWS>>() - size_of::<FixedScene<(), 100, 20>>(), 320 * ROWS);
@@ -75,7 +76,7 @@ fn built<M: Material>(material: &M, body: &Body, rows: usize) -> Result<SceneFac
     let mut nodes = vec![NodeInertia::EMPTY; body.points.len()];
     let mut tiles = vec![ElementTile::EMPTY; tiles_for(body.tets.len())];
     let mut rows = vec![PatchRow::EMPTY; rows];
-    SceneFacts::build(material, &body.mesh(), [].into_iter(), &mut nodes, &mut tiles, &mut rows)
+    SceneFacts::build(material, &body.mesh(), [].into_iter(), &mut nodes, &mut tiles, &mut rows, &mut [])
 }
 
 /// Rows that are needed, and rows that are then in use. With fewer the error tells of enough, from some capacity on

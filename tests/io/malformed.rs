@@ -68,7 +68,8 @@ fn the_files_that_are_broken_below_are_sound() {
         ("a.msh", MSH4, vec![5]),
         ("a.ele", TETGEN, vec![8]),
     ] {
-        let expected = TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions };
+        let expected =
+            TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions, vectors: vec![] };
         assert_eq!(read(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
         let marked = format!("\u{feff}{}", content.replace("---\n", "---\n\u{feff}"));
         assert_eq!(read(name, marked.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");

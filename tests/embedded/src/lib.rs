@@ -80,10 +80,10 @@ pub extern "C" fn nodal_strain(
     }
     let (mut nodes, mut tiles) = ([NodeInertia::EMPTY; 100], [ElementTile::EMPTY; 20]);
     let supports = supports.iter().copied();
-    let Ok(facts) = SceneFacts::build(&material, &mesh, supports, &mut nodes, &mut tiles, rows) else {
+    let Ok(facts) = SceneFacts::build(&material, &mesh, supports, &mut nodes, &mut tiles, rows, &mut []) else {
         return -2.0;
     };
-    let lent = SceneView::new(&material, &nodes, &tiles, rows, &facts);
+    let lent = SceneView::new(&material, &nodes, &tiles, rows, &[], &facts);
     at_critical_step(&scene, state) + at_critical_step(&lent, state)
 }
 

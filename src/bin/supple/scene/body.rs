@@ -55,7 +55,7 @@ impl Body {
         // Without the noise of float32, for the people who read the files; far below it in size.
         let clean = |component: f32| (f64::from(component) * 1e9).round() / 1e9;
         let points = bar.points().map(|point| point.map(clean)).collect();
-        let mesh = TetMesh { points, tets: bar.tets().collect(), triangles: vec![], regions: vec![] };
+        let mesh = TetMesh { points, tets: bar.tets().collect(), triangles: vec![], regions: vec![], vectors: vec![] };
         Self::new(mesh, Winding::Checked, "bar".into())
     }
 

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
+use super::directions::DirectionsTable;
 use super::instruments::InstrumentTable;
 use super::points::PointTable;
 use super::pulls::PullTable;
@@ -27,6 +28,7 @@ pub(crate) struct SceneTable {
     pub(crate) material: Spanned<TissueTable>,
     #[serde(default)]
     pub(crate) region: Vec<Spanned<TissueTable>>,
+    pub(crate) directions: Option<Spanned<DirectionsTable>>,
     pub(crate) damping: Option<Spanned<f32>>,
     #[serde(default)]
     pub(crate) fix: Vec<Spanned<FixTable>>,

@@ -4,6 +4,7 @@
 //! `file` is what a person may write, `setup` what comes of it; in between each file reads one part.
 
 pub mod body;
+pub(crate) mod directions;
 pub mod file;
 pub mod instruments;
 pub(crate) mod learned;

@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use supple::material::{AnyLaw, Element, Law, Moduli, Prony, Tissue, VecMaterial};
+use supple::material::{AnyLaw, Directions, Element, FIBRE_TERMS, Fibres, Law, Moduli, Prony, Tissue, VecMaterial};
 use supple::mlp::Recipe;
 use supple::plausibility::same;
 use toml::Spanned;
 
 use super::body::Body;
+use super::directions;
 use super::file::{SceneFile, Selection, TissueTable};
 use super::select::inside;
 use crate::problem::Problem;
@@ -20,26 +21,35 @@ pub struct Tissues {
     tissues: Vec<Tissue<AnyLaw>>,
     /// How each relaxes.
     prony: Vec<Prony>,
+    /// The fibres of each.
+    fibres: Vec<Fibres>,
+    /// Their directions in each element; empty if there are none.
+    directions: Vec<Directions>,
     /// For each element the index of its tissue; empty if all are of one.
     of_element: Vec<u16>,
 }
 
+/// Keys of `[material]` that are no constants of a law; a region has the same but for the law.
+const KEYS: [&str; 6] = ["law", "density", "prony", "fibres", "sheets", "coupling"];
+
 impl Tissues {
     /// The same everywhere.
     pub(crate) fn one(tissue: Tissue<AnyLaw>) -> Self {
-        Self { tissues: vec![tissue], prony: vec![Prony::NONE], of_element: vec![] }
+        let (prony, fibres) = (vec![Prony::NONE], vec![Fibres::NONE]);
+        Self { tissues: vec![tissue], prony, fibres, directions: vec![], of_element: vec![] }
     }
 
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
-        let material = Table::new(file, &file.scene.material, &["law", "density", "prony"])?;
+        let material = Table::new(file, &file.scene.material, &KEYS)?;
         let law = read_law(file, &material.required("law")?)?;
         let density = material.required("density")?;
         let base = Tissue { law: material.constants(law, true)?, density: positive(file, "density", &density)? };
         let mut tissues = vec![base];
         let mut prony = vec![material.prony()?.unwrap_or(Prony::NONE)];
+        let mut fibres = vec![material.fibres(Fibres::NONE)?];
         let mut of_element = vec![0; body.mesh.tets.len()];
         for at in &file.scene.region {
-            let region = Table::new(file, at, &["tags", "plane", "box", "density", "prony"])?;
+            let region = Table::new(file, at, &[&["tags", "plane", "box"], &KEYS[1..]].concat())?;
             let law = region.constants(base.law, false)?;
             let density = match region.get("density")? {
                 Some(density) => positive(file, "density", &density)?,
@@ -52,8 +62,19 @@ impl Tissues {
             }
             tissues.push(Tissue { law, density });
             prony.push(region.prony()?.unwrap_or(prony[0]));
+            fibres.push(region.fibres(fibres[0])?);
         }
-        Ok(Self { tissues, prony, of_element })
+        let directions = match &file.scene.directions {
+            Some(at) if !fibres.iter().any(Fibres::are_there) => {
+                return Err(file.problem(at, "no tissue has fibres: give fibres = [a, b] under [material]"));
+            }
+            Some(at) => directions::read(file, at, body)?,
+            None if fibres.iter().any(Fibres::are_there) => {
+                return Err(file.problem(&file.scene.material, "tissue with fibres needs [directions]"));
+            }
+            None => vec![],
+        };
+        Ok(Self { tissues, prony, fibres, directions, of_element })
     }
 
     /// The tissue, if there is only one.
@@ -94,20 +115,19 @@ impl Tissues {
         self.prony.iter().any(|series| *series != Prony::NONE)
     }
 
+    /// Whether some of them have fibres.
+    pub(crate) fn have_fibres(&self) -> bool {
+        self.fibres.iter().any(Fibres::are_there)
+    }
+
     /// What a scene of these tissues in these tetrahedra is made of.
     pub(crate) fn material(&self, element: Element) -> VecMaterial {
         let law = self.tissues[0].law;
         let tissues = self.tissues.iter().map(Tissue::values).collect();
         let prony = if self.relax() { self.prony.clone() } else { vec![] };
-        VecMaterial {
-            element,
-            law,
-            tissues,
-            of_element: self.of_element.clone(),
-            prony,
-            fibres: vec![],
-            directions: vec![],
-        }
+        let fibres = if self.have_fibres() { self.fibres.clone() } else { vec![] };
+        let (of_element, directions) = (self.of_element.clone(), self.directions.clone());
+        VecMaterial { element, law, tissues, of_element, prony, fibres, directions }
     }
 }
 
@@ -117,6 +137,9 @@ impl fmt::Display for Tissues {
         write!(f, "{law}, {density} kg/m^3")?;
         if self.prony[0] != Prony::NONE {
             write!(f, ", relaxes: {}", self.prony[0])?;
+        }
+        if self.fibres[0].are_there() {
+            write!(f, ", {}", self.fibres[0])?;
         }
         match self.tissues.len() - 1 {
             0 => Ok(()),
@@ -202,6 +225,23 @@ impl<'a> Table<'a> {
         series
             .map(Some)
             .map_err(|error| self.file.problem(&terms, format!("{error} (prony = [[share, seconds], ...])")))
+    }
+
+    /// The fibres, of which what is not given is that of `others`: an empty list is no such term.
+    fn fibres(&self, others: Fibres) -> Result<Fibres, Problem> {
+        let mut terms = others.terms().map(|[a, b]| (a > 0.0).then_some([a, b]));
+        let keys: [_; FIBRE_TERMS] = ["fibres", "sheets", "coupling"];
+        let mut fibres = others;
+        for (term, key) in keys.into_iter().enumerate() {
+            let Some(given) = self.get::<Vec<f32>>(key)? else { continue };
+            terms[term] = match given.get_ref()[..] {
+                [] => None,
+                [a, b] => Some([a, b]),
+                _ => return Err(self.file.problem(&given, format!("{key} = [a, b]: a in Pa, b without unit"))),
+            };
+            fibres = Fibres::new(terms).map_err(|error| self.file.problem(&given, error))?;
+        }
+        Ok(fibres)
     }
 
     /// The elements of a region, by tag or by their middle; none is an error.
