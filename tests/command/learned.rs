@@ -66,6 +66,17 @@ fn tissue_that_relaxes_is_refused() {
 }
 
 #[test]
+fn tissue_with_fibres_is_refused() {
+    let desk = Desk::new();
+    desk.network("a.weights", &stopping());
+    let fibres = "fibres = [1000.0, 5.0]\ndensity";
+    let directions = "[directions]\nfibre = [0.0, 0.0, 1.0]\n[time]";
+    let scene = leaning("end = 0.6\n", "").replace("density", fibres).replace("[time]", directions);
+    let said = desk.simulate(&scene, &[]);
+    assert!(said.code == 2 && said.err.contains("learned steps do not know fibres"), "{}", said.err);
+}
+
+#[test]
 fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
     let desk = Desk::new();
     desk.network("a.weights", &stopping());

@@ -1,6 +1,7 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
 mod demo;
 mod errors;
+mod fibres;
 mod fit;
 mod inertia;
 mod inspect;

@@ -109,7 +109,7 @@ fn every_way_to_rest_leads_to_the_same_place() {
             let critical = simulation.critical_step().unwrap().seconds;
             let step = multiple.map(|multiple| multiple * critical);
             simulation.set(Settings { method, step, damping: 20.0, ..Settings::default() });
-            for _ in 0..60 {
+            for _ in 0..120 {
                 let report = simulation.advance(1.0 / 30.0).unwrap();
                 assert!(report.status.is_taken(), "{element:?}: {:?}", report.status);
             }
@@ -128,6 +128,7 @@ fn every_way_to_rest_leads_to_the_same_place() {
             let long = rest(Method::Long(method), Some(multiple), Some(all()));
             let off = apart(&exact, &long) / way;
             println!("{element:?}: {off:.1e} off after {multiple} times the critical step");
+            assert!(off < 5e-4);
         }
     }
 }
@@ -158,13 +159,15 @@ fn long_steps_swing_as_exact_ones() {
                 let off = exact.iter().zip(&long).map(|(a, b)| apart(a, b)).sum::<f64>() / exact.len() as f64;
                 (100.0 * off / most, 1e3 * most, 1e6 * step)
             });
-            println!("{element:?} {multiple}x: (% off in the mean, of mm, step in us) {fibrous:.2?}, without fibres {plain:.2?}");
+            println!(
+                "{element:?} {multiple}x: (% off in the mean, of mm, step in us) {fibrous:.2?}, without fibres {plain:.2?}"
+            );
             assert!(fibrous.0 < 1.5 * plain.0 + 0.2);
         }
     }
 }
 
-/// Also with several tissues of which one has no fibres, one relaxes, and in blocks of memory that are cut elsewhere.
+/// Also with several tissues of which one has no fibres, and one relaxes.
 #[test]
 fn every_number_of_threads_gives_the_same_bits() {
     for element in ELEMENTS {
@@ -281,7 +284,10 @@ fn fibres_that_cannot_be_are_told() {
         with([0.0, 1.0, 0.0], [0.0; 3]),
     ] {
         println!("{error}");
-        assert!(matches!(error, BuildError::DirectionCount { directions: 0, .. } | BuildError::Direction { element: 5, .. }));
+        assert!(matches!(
+            error,
+            BuildError::DirectionCount { directions: 0, .. } | BuildError::Direction { element: 5, .. }
+        ));
     }
     for (terms, expected) in [
         ([Some([-1.0, 1.0]), None, None], (0, 0)),

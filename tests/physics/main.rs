@@ -23,4 +23,5 @@ mod patch;
 mod reference_self;
 mod relaxation;
 mod stability;
+mod tube;
 mod vibration;

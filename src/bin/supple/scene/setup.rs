@@ -84,6 +84,10 @@ impl Setup {
                 let message = "learned steps do not know tissue that relaxes; remove prony, or take another method";
                 return Err(file.problem(&scene.material, message));
             }
+            if tissues.have_fibres() {
+                let message = "learned steps do not know fibres; remove them, or take another method";
+                return Err(file.problem(&scene.material, message));
+            }
         }
         Ok(Self {
             body,
