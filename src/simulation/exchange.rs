@@ -9,7 +9,7 @@ use std::vec::Vec;
 use super::owned::{Exact, Prepared};
 use super::remembered::carry;
 use super::{Simulation, SimulationError};
-use crate::material::{AnyLaw, Law, Prony, TissueValues, Values, VecMaterial};
+use crate::material::{AnyLaw, Fibres, Law, Prony, TissueValues, Values, VecMaterial};
 use crate::mesh::{Mesh, Winding};
 use crate::pulls::let_go_of_removed;
 use crate::scene::BuildError;
@@ -120,6 +120,10 @@ impl Simulation<'_> {
                 if let Some(&series) = material.prony.get(usize::from(*place)) {
                     material.prony.resize(number, Prony::NONE);
                     material.prony.push(series);
+                }
+                if let Some(&fibres) = material.fibres.get(usize::from(*place)) {
+                    material.fibres.resize(number, Fibres::NONE);
+                    material.fibres.push(fibres);
                 }
                 ablations.push(Ablation { tissue: number, from: tissue.constants, to, start, seconds, stage: 0 });
                 number

@@ -2,7 +2,7 @@
 
 use super::*;
 
-use supple::material::{AnyLaw, Exponential, Law, Prony, TissueValues};
+use supple::material::{AnyLaw, Directions, Exponential, Fibres, Law, Prony, TissueValues};
 use supple::simulation::SimulationError;
 
 const STIFF: NeoHookean = NeoHookean { c: 2500.0, d: 50_000.0 };
@@ -117,14 +117,15 @@ fn other_constants_need_no_other_tables() {
     }
 }
 
-/// In tables that were built anew each element remembers what it did, and so do the parts of a tissue that became two.
+/// In tables that were built anew each element remembers what it did and has its fibres, and so have the parts of a
+/// tissue that became two.
 #[test]
-fn tissue_that_relaxes_remembers_in_other_tables() {
+fn tissue_that_relaxes_and_has_fibres_goes_on_in_other_tables() {
     for element in ELEMENTS {
         let of_density = |factor: f32| VecMaterial {
             prony: vec![Prony::new(&[[0.5, 0.01], [0.2, 0.1]]).unwrap()],
-            fibres: vec![],
-            directions: vec![],
+            fibres: vec![Fibres::new([Some([500.0, 4.0]), None, None]).unwrap()],
+            directions: vec![Directions { fibre: [0.0, 0.6, 0.8], sheet: [0.0; 3] }; BAR.element_count()],
             ..VecMaterial::one(element, SOFT, factor * DENSITY)
         };
         let supports: Vec<_> = (0..25).map(Support::fixed).collect();

@@ -1,10 +1,11 @@
 //! Tissue with fibres against closed forms, and its stiffness against float64.
 
-use supple::material::{AnyLaw, Directions, Element, Exponential, Fibres, VecMaterial};
+use supple::material::{AnyLaw, Directions, Element, Exponential, Fibres, Prony, VecMaterial};
 use supple::scene::VecScene;
 use supple::tled;
 
-use crate::reference::tensor::{Mat3, determinant, from_fn, product, transpose};
+use crate::reference::tensor::{Mat3, determinant, from_fn, inverse, max_abs, product, transpose};
+use crate::relaxation::Specimen;
 use crate::support::{Body, DENSITY, bound, displaced, forces, largest_distance, to_f32};
 
 /// Constants of Holzapfel & Ogden 2009, table 1, for the shear of pig myocardium (Pa): `a`, `b`, then those of fibres,
@@ -132,6 +133,38 @@ fn stretches_along_one_and_two_families_are_those_of_the_closed_forms() {
                 assert!((computed - closed).abs() < 1e-3 * closed.abs().max(10.0));
             }
         }
+    }
+}
+
+/// What relaxes of the stress of distortion is a share of that of the fibres as well: at a held strain the stress is
+/// `P - g (1 - e^(-t / tau)) (P - p C)`, with the pressure `p` of the law.
+#[test]
+fn the_stress_of_fibres_relaxes_as_in_the_closed_form() {
+    const TAU: f64 = 0.2;
+    const SHARE: f64 = 0.6;
+    let f = [[1.1, 0.2, 0.0], [0.0, 0.98, 0.1], [0.05, 0.0, 0.95]];
+    let (j, cofactor) = (determinant(&f), transpose(&inverse(&f)));
+    let terms = [Some(FIBRES), Some(SHEETS), Some(COUPLING)];
+    for element in Element::ALL {
+        let prony = vec![Prony::new(&[[SHARE as f32, TAU as f32]]).unwrap()];
+        let material = VecMaterial { prony, ..material(element, terms, 162) };
+        let seconds = TAU / 50.0;
+        let mut specimen = Specimen::of(material, seconds);
+        specimen.start(&f);
+        let mut worst = 0.0_f64;
+        let (mut first, mut distortion) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for step in 0..150 {
+            let stress = specimen.step(&f);
+            if step == 0 {
+                let pressure = 2.0 * f64::from(D) * (j - 1.0) * j;
+                (first, distortion) = (stress, from_fn(|i, k| stress[i][k] - pressure * cofactor[i][k]));
+            }
+            let relaxed = SHARE * (1.0 - (-f64::from(step) * seconds / TAU).exp());
+            let exact = from_fn(|i, k| first[i][k] - relaxed * distortion[i][k]);
+            worst = worst.max(max_abs(&from_fn(|i, k| stress[i][k] - exact[i][k])) / max_abs(&distortion));
+        }
+        println!("{element:?}: {:.0} Pa relax within {worst:.1e}", max_abs(&distortion));
+        assert!(worst < 1e-4 && max_abs(&distortion) > 1e3);
     }
 }
 

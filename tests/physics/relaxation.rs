@@ -19,7 +19,7 @@ const ELEMENTS: [Element; 3] = Element::ALL;
 const IDENTITY: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// A body all of whose nodes are moved, so that its deformation is the same everywhere.
-struct Specimen {
+pub(crate) struct Specimen {
     body: Body,
     scene: VecScene<VecMaterial>,
     state: VecState,
@@ -28,9 +28,13 @@ struct Specimen {
 
 impl Specimen {
     fn new(element: Element, law: AnyLaw, prony: &[[f32; 2]], seconds: f64) -> Self {
-        let body = Body::irregular([0.03, 0.03, 0.03], [3, 3, 3]);
         let tissue = VecMaterial::one(element, law, DENSITY);
-        let material = VecMaterial { prony: vec![Prony::new(prony).unwrap()], ..tissue };
+        Self::of(VecMaterial { prony: vec![Prony::new(prony).unwrap()], ..tissue }, seconds)
+    }
+
+    /// Of 162 elements.
+    pub(crate) fn of(material: VecMaterial, seconds: f64) -> Self {
+        let body = Body::irregular([0.03, 0.03, 0.03], [3, 3, 3]);
         let supports: Vec<_> = (0..body.points.len() as u32).map(Support::moved).collect();
         let scene = VecScene::build(material, &body.mesh(), &supports).unwrap();
         let state = VecState::of(scene.view());
@@ -43,14 +47,14 @@ impl Specimen {
     }
 
     /// It has this deformation gradient from now on, and had none before.
-    fn start(&mut self, f: &Mat3) {
+    pub(crate) fn start(&mut self, f: &Mat3) {
         let at: Vec<_> = (0..self.body.points.len()).map(|node| self.displacement(node, f)).collect();
         assert!(tled::start(&self.scene, &mut self.state, &self.step, |node| (at[node], [0.0; 3])));
     }
 
     /// The first Piola-Kirchhoff stress at present (Pa), from the forces: `P = sum_a f_a X_a^T / V`. The deformation
     /// gradient becomes `next` in the step.
-    fn step(&mut self, next: &Mat3) -> Mat3 {
+    pub(crate) fn step(&mut self, next: &Mat3) -> Mat3 {
         let nodes = self.body.points.len();
         let motion = |node: usize| Motion {
             node: node as u32,

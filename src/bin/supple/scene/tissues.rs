@@ -154,7 +154,13 @@ fn read_law(file: &SceneFile, at: &Spanned<String>) -> Result<AnyLaw, Problem> {
     AnyLaw::all().find(|law| law.name() == name).ok_or_else(|| {
         let mut known: Vec<_> = AnyLaw::all().map(|law| format!("\"{}\"", law.name())).collect();
         let last = known.pop().unwrap_or_default();
-        file.problem(at, format!("law \"{name}\" is not known; {} and {last} are", known.join(", ")))
+        file.problem(
+            at,
+            format!(
+                "law \"{name}\" is not known; {} and {last} are, each with fibres = [a, b] if wanted",
+                known.join(", ")
+            ),
+        )
     })
 }
 
