@@ -91,6 +91,53 @@ static supple_status scene_with(supple_scene_config config) {
     return status;
 }
 
+/* Of two tissues the second one, that of element 17, has fibres and sheets, the first one only fibres. */
+static void fibres(supple_scene_config bad, const uint16_t *of_element) {
+    static supple_fibres fibres[2] = {{{1e3f, 10.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}}, {{1e3f, 10.0f}, {1e3f, 10.0f}, {1e2f, 5.0f}}};
+    static float directions[TETS][2][3];
+    for (int e = 0; e < TETS; e++) directions[e][0][0] = 2.0f, directions[e][1][1] = of_element[e] == 1 ? 0.1f : 0.0f;
+    bad.fibres = fibres, bad.directions = directions[0][0];
+    DONE(scene_with(bad));
+#define FIBRES(field, wrong, at)                                                                                       \
+    do {                                                                                                               \
+        const float kept = fibres[1].field;                                                                            \
+        fibres[1].field = (wrong);                                                                                     \
+        REFUSED(SUPPLE_E_FIBRES, scene_with(bad));                                                                     \
+        CHECK(error.index == 1 && error.axis == (at));                                                                  \
+        CHECK((float)error.value == fibres[1].field || (isnan(error.value) && isnan(fibres[1].field)));                \
+        fibres[1].field = kept;                                                                                        \
+    } while (0)
+    FIBRES(fibres[0], -1.0f, 0);
+    FIBRES(fibres[1], 0.0f, 0);
+    FIBRES(sheets[0], NAN, 1);
+    FIBRES(sheets[1], INFINITY, 1);
+    FIBRES(coupling[1], 0.0f, 2);
+    FIBRES(coupling[0], -INFINITY, 2);
+#define DIRECTION(place, component, wrong)                                                                             \
+    do {                                                                                                               \
+        const float kept = (place)[component];                                                                         \
+        (place)[component] = (wrong);                                                                                  \
+        REFUSED(SUPPLE_E_DIRECTION, scene_with(bad));                                                                  \
+        CHECK(error.index == 17 && error.value == 0.0 && error.limit == 0.0);                                          \
+        (place)[component] = kept;                                                                                     \
+    } while (0)
+    DIRECTION(directions[17][0], 0, 0.0f);
+    DIRECTION(directions[17][0], 2, NAN);
+    DIRECTION(directions[17][0], 1, INFINITY);
+    DIRECTION(directions[17][1], 1, 0.0f);
+    directions[17][1][0] = 1.0f;
+    DONE(scene_with(bad));
+    DIRECTION(directions[17][1], 1, 0.0f);
+    DIRECTION(directions[17][1], 1, NAN);
+    bad.directions = NULL;
+    REFUSED(SUPPLE_E_DIRECTION, scene_with(bad));
+    CHECK(error.index == SUPPLE_NONE && error.value == 0.0 && error.limit == TETS);
+    bad.directions = (const float *)(const void *)((const char *)directions + 2);
+    REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+    bad.fibres = (const supple_fibres *)(const void *)((const char *)fibres + 2);
+    REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+}
+
 static void scenes(void) {
     const supple_scene_config good = bar_config();
     supple_scene_config bad = good;
@@ -162,6 +209,8 @@ static void scenes(void) {
     RELAXES(SUPPLE_E_RELAXATION_TIME, seconds[2], NAN, 2, 1e-6f);
     bad.prony = (const supple_prony *)(const void *)((const char *)series + 2);
     REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+    bad.prony = NULL;
+    fibres(bad, of_element);
 
 #define MESH(expected, place, value)                                                                                   \
     do {                                                                                                               \
