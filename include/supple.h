@@ -626,8 +626,8 @@ enum supple_status
      */
     SUPPLE_E_NO_PULLS = -96,
     /**
-     * The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
-     * (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
+     * The step was not taken: learned steps do not know tissue that relaxes or has fibres. Or a state remembers more or
+     * fewer bytes (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
      */
     SUPPLE_E_NO_RELAXATION = -97,
     /**

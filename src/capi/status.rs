@@ -189,8 +189,8 @@ pub enum supple_status {
     SUPPLE_E_NO_CONTACT = -95,
     /// The step was not taken: learned steps do not know pulls.
     SUPPLE_E_NO_PULLS = -96,
-    /// The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
-    /// (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
+    /// The step was not taken: learned steps do not know tissue that relaxes or has fibres. Or a state remembers more or
+    /// fewer bytes (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
     SUPPLE_E_NO_RELAXATION = -97,
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
@@ -486,7 +486,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -60 => c"a lattice that cannot be, or a mesh too small for one",
         -61 => c"too stiff, or not finite",
         -65 => c"a constant of fibres is not a finite positive number",
-        -66 => c"an element has no directions of its fibres, or no two of them",
+        -66 => c"the directions of the fibres in an element are zero, parallel or missing",
         -70 => c"not a saved state",
         -71 => c"a saved state of another version",
         -72 => c"the saved state is damaged",
@@ -500,7 +500,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
-        -97 => c"learned steps do not know tissue that relaxes, or the state has not the memory that such tissue needs",
+        -97 => c"learned steps do not know tissue that relaxes or has fibres, or the state has no memory for what tissue remembers",
         _ => return None,
     })
 }
