@@ -1242,6 +1242,35 @@ static void relaxing_tissue(supple_scene_config config) {
     REFUSED(SUPPLE_E_NULL, supple_state_saved_size(remembering, NULL));
 }
 
+/* Nor do they know fibres. */
+static void fibrous_tissue(supple_scene_config config) {
+    const supple_fibres fibres = {{1e3f, 10.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}};
+    static float directions[TETS][6];
+    for (int e = 0; e < TETS; e++) directions[e][2] = 1.0f;
+    config.fibres = &fibres, config.directions = directions[0];
+    const size_t of_scene = SUPPLE_SCENE_SIZE(NODES, TETS, 1) + SUPPLE_FIBRES_SIZE(NODES, TETS, 1, ELEMENT);
+    const size_t of_learned = SUPPLE_LEARNED_SIZE(NODES, 1), of_state = SUPPLE_STATE_SIZE(NODES, ELEMENT);
+    CHECK(of_scene + of_state + of_learned <= sizeof spare);
+    supple_scene *fibrous;
+    supple_state *its_state;
+    supple_learned *network;
+    supple_learned_facts facts;
+    DONE(supple_scene_init(spare, of_scene, &config, &fibrous, NULL));
+    DONE(supple_state_init(spare + of_scene, of_state, fibrous, &its_state));
+    for (uint32_t fallback = 0; fallback < 2; fallback++) {
+        const supple_learned_config given = {SUPPLE_CONFIG(supple_learned_config), fallback, 0, weights, sizeof weights};
+        DONE(supple_learned_init(spare + of_scene + of_state, of_learned, fibrous, &given, &network, NULL));
+        DONE(supple_learned_describe(network, &facts));
+        const supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 10.0f, facts.damping};
+        DONE(supple_set_step(fibrous, its_state, &exact, NULL));
+        DONE(supple_state_reset(its_state));
+        DONE(supple_learned_lead(fibrous, NULL, its_state, network, 5 * (double)facts.seconds, NULL, NULL));
+        const supple_status told = supple_learned_step(fibrous, NULL, its_state, network, 1, NULL, NULL);
+        note(told);
+        CHECK(told == (fallback ? SUPPLE_FELL_BACK : SUPPLE_E_NO_RELAXATION));
+    }
+}
+
 static void images(void) {
     static supple_followed_point located[2];
     static float places[2][3] = {{0.01f, 0.01f, 0.01f}, {0.01f, 0.01f, -0.01f}}, moved[2][3], field[3 * 27];
@@ -1354,6 +1383,7 @@ int main(int argc, char **argv) {
     contacts();
     pulls();
     relaxing_tissue(config);
+    fibrous_tissue(config);
     remarks(config);
     little_work(&config);
     DONE(supple_state_reset(state));

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import supple
-from conftest import bar
+from conftest import ROOT, bar
 
 FIBRES, SHEETS, COUPLING = [18472.0, 16.026], [2481.0, 11.12], [216.0, 11.436]
 
@@ -165,3 +165,13 @@ def test_directions_that_cannot_be_are_refused_in_words(soft):
             supple.Scene(mesh, material, directions=directions)
     # Sheets that are not read may be anything.
     supple.Scene(mesh, fibrous, directions=parallel)
+
+
+def test_learned_steps_do_not_know_them():
+    mesh = bar(cells=(8, 8, 17), size=(0.05, 0.05, 0.1))
+    material = supple.Material("exponential", a=59.0, b=8.023, d=60000.0, density=1000.0, fibres=[100.0, 5.0])
+    scene = supple.Scene(mesh, material, fixed=mesh.points[:, 2] < 1e-6, element="linear", directions=along(mesh, [0, 0, 1]))
+    weights = ROOT / "weights" / "compact-10.weights"
+    simulation = supple.Simulation(scene, "learned", weights=weights, fallback=False, lead_in=0.03)
+    with pytest.raises(supple.Diverged, match="learned steps do not know tissue that relaxes or has fibres"):
+        simulation.advance(0.1)
