@@ -40,6 +40,7 @@ class SceneConfig(Structure):
         ("points", POINTER(c_float)), ("tetrahedra", POINTER(c_uint32)), ("support", POINTER(Support)),
         ("tissue", POINTER(Tissue)), ("tissue_of_element", POINTER(c_uint16)),
         ("element", c_uint32), ("reserved", c_uint32), ("removed", POINTER(c_uint8)), ("prony", POINTER(c_float)),
+        ("fibres", POINTER(c_float)), ("directions", POINTER(c_float)),
     ]
 
 

@@ -64,7 +64,7 @@ int main(void) {
     const supple_scene_config body = {SUPPLE_CONFIG(supple_scene_config), SUPPLE_EXPONENTIAL,
                                       SUPPLE_WINDING_CHECKED, NODES, LOBE_TETRAHEDRA, supports, 1,
                                       lobe_points[0], lobe_tetrahedra[0], held, &TISSUE, NULL,
-                                      SUPPLE_LINEAR /* as in the network's training */, 0, NULL, NULL};
+                                      SUPPLE_LINEAR /* as in the network's training */, 0, NULL, NULL, NULL, NULL};
     const supple_learned_config network = {SUPPLE_CONFIG(supple_learned_config), 1, 0, compact, sizeof compact};
     supple_scene *scene;
     supple_loads *loads;

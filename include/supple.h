@@ -40,8 +40,9 @@
 #define SUPPLE_POLYNOMIAL 2 /* c (Pa), e (Pa), d (Pa) */
 
 /* Sizes as constant expressions: what the functions give; with SUPPLE_NODAL_STRAIN a scene needs SUPPLE_SCENE_SIZE and
- * SUPPLE_PATCHES_SIZE together, with tissue that relaxes and SUPPLE_PRONY_SIZE, and its state SUPPLE_STATE_SIZE and
- * SUPPLE_RELAXATION_SIZE; of a supple_large, with x * y * z cells that you give, never less. */
+ * SUPPLE_PATCHES_SIZE together, with tissue that relaxes and SUPPLE_PRONY_SIZE, with fibres and SUPPLE_FIBRES_SIZE; the state of
+ * tissue that relaxes needs SUPPLE_STATE_SIZE and SUPPLE_RELAXATION_SIZE; of a supple_large, with x * y * z cells that you give,
+ * never less. */
 #define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \
     1024 * SUPPLE_TILES_(elements) + SUPPLE_ARRAY_(tissues, 20) + SUPPLE_ARRAY_((tissues) > 1 ? (elements) : 0, 2))
 #define SUPPLE_PATCHES_SIZE(nodes, elements, tissues) ((size_t)320 * (9 + SUPPLE_GROUPS_(elements) *                             \
@@ -49,6 +50,9 @@
     (4 * (size_t)(elements) + 2 * SUPPLE_PATCHES_(nodes, elements, tissues) + 15) / 16 + (((size_t)(nodes) + 1) / 2 + 39) / 40 + \
     (2 * (size_t)(elements) + 39) / 40 + (SUPPLE_PATCHES_(nodes, elements, tissues) + 39) / 40))
 #define SUPPLE_PRONY_SIZE(tissues) SUPPLE_ARRAY_(tissues, 24)
+#define SUPPLE_FIBRES_SIZE(nodes, elements, tissues, element) (SUPPLE_ARRAY_(tissues, 24) + (size_t)384 *                      \
+    ((element) == SUPPLE_NODAL_STRAIN ? SUPPLE_PATCHES_(nodes, elements, tissues) / 16 + SUPPLE_GROUPS_(elements)              \
+                                      : SUPPLE_TILES_(elements)))
 #define SUPPLE_RELAXATION_SIZE(nodes, elements, tissues, element, terms) ((size_t)768 * (terms) *                              \
     ((element) == SUPPLE_NODAL_STRAIN ? SUPPLE_PATCHES_(nodes, elements, tissues) / 16 + SUPPLE_GROUPS_(elements)              \
                                       : SUPPLE_TILES_(elements)))
@@ -559,6 +563,16 @@ enum supple_status
      */
     SUPPLE_E_TOO_STIFF = -61,
     /**
+     * A constant of the fibres of tissue `index` (value; axis: its term, 0 for fibres, 1 for sheets, 2 for coupling) is not a
+     * finite positive number.
+     */
+    SUPPLE_E_FIBRES = -65,
+    /**
+     * The directions of the fibres in element `index` are zero, not finite, or parallel where there are two. Or without an
+     * index: there are none (value) where so many (limit) are needed.
+     */
+    SUPPLE_E_DIRECTION = -66,
+    /**
      * Not a saved state.
      */
     SUPPLE_E_NOT_SAVED = -70,
@@ -612,8 +626,8 @@ enum supple_status
      */
     SUPPLE_E_NO_PULLS = -96,
     /**
-     * The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
-     * (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
+     * The step was not taken: learned steps do not know tissue that relaxes or has fibres. Or a state remembers more or
+     * fewer bytes (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
      */
     SUPPLE_E_NO_RELAXATION = -97,
     /**
@@ -746,6 +760,26 @@ typedef struct {
 } supple_prony;
 
 /**
+ * The fibres of a tissue: an energy of their stretch that is added to that of the law, with up to three terms. Each has the
+ * constants `a` (Pa) and `b` (no unit), in this order, both finite and positive; `a` = 0: no such term, and `b` is ignored.
+ * Families of fibres resist where they are longer than at rest, not where they are shorter.
+ */
+typedef struct {
+    /**
+     * Of the stretch along the first direction of each element: fibres.
+     */
+    float fibres[2];
+    /**
+     * Of the stretch along the second one: sheets, or a second family.
+     */
+    float sheets[2];
+    /**
+     * Of the shear between both.
+     */
+    float coupling[2];
+} supple_fibres;
+
+/**
  * What a scene is built from. Everything is copied; nothing needs to stay.
  */
 typedef struct {
@@ -819,6 +853,17 @@ typedef struct {
      * Only in a library with all laws.
      */
     const supple_prony *prony;
+    /**
+     * The fibres of each of the `tissues`; NULL: none has any. Needs more memory: supple_fibres_size. Only in a library with
+     * all laws.
+     */
+    const supple_fibres *fibres;
+    /**
+     * With fibres: six numbers for each element, a vector along its fibres and one along its sheets, at rest, of any length but
+     * zero. The part of the second one along the first is taken off; where the element's tissue has neither sheets nor coupling
+     * it is not read, and where it has no fibres neither is. Without fibres: NULL.
+     */
+    const float *directions;
 } supple_scene_config;
 
 /**
@@ -838,7 +883,7 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * 0, 1, 2 for x, y, z; or of a tissue that relaxes for the terms of its series.
+     * 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these.
      */
     uint32_t axis;
     /**
@@ -1778,8 +1823,20 @@ size_t supple_relaxation_size(uint32_t nodes,
                               uint32_t terms);
 
 /**
+ * Bytes of memory that a scene with fibres needs more than supple_scene_size; zero if there can be no such scene.
+ * SUPPLE_FIBRES_SIZE is the same as a constant.
+ *
+ * @param element SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
+ */
+size_t supple_fibres_size(uint32_t nodes,
+                          uint32_t elements,
+                          uint32_t tissues,
+                          uint32_t element);
+
+/**
  * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
- * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
+ * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size, with fibres
+ * supple_fibres_size.
  */
 size_t supple_scene_size(uint32_t nodes,
                          uint32_t elements,
@@ -1797,8 +1854,9 @@ size_t supple_patches_size(uint32_t nodes,
 
 /**
  * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, with
- * tissue that relaxes and supple_prony_size, aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning
- * of that memory. What it takes of it is told by supple_scene_describe; the rest is free for other use.
+ * tissue that relaxes and supple_prony_size, with fibres and supple_fibres_size, aligned to SUPPLE_ALIGN. On success
+ * `*scene` is the scene, at the beginning of that memory. What it takes of it is told by supple_scene_describe; the rest is
+ * free for other use.
  *
  * @param error may be NULL; index is that of an element, a support, a node or a tissue as the status says.
  */

@@ -27,6 +27,8 @@ using support = supple_support;
 using tissue = supple_tissue;
 // How a tissue relaxes.
 using prony = supple_prony;
+// The fibres of a tissue.
+using fibres = supple_fibres;
 using force = supple_force;
 using motion = supple_motion;
 using threads = supple_threads;
@@ -120,6 +122,8 @@ enum class [[nodiscard]] status : std::int32_t {
 
     e_lattice = SUPPLE_E_LATTICE,
     e_too_stiff = SUPPLE_E_TOO_STIFF,
+    e_fibres = SUPPLE_E_FIBRES,
+    e_direction = SUPPLE_E_DIRECTION,
 
     e_not_saved = SUPPLE_E_NOT_SAVED,
     e_saved_version = SUPPLE_E_SAVED_VERSION,
@@ -263,7 +267,8 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
     case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
     case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): case of(s::e_diverged_pressure):
-    case of(s::e_relaxation_share): case of(s::e_relaxation_time): case of(s::e_no_relaxation): return true;
+    case of(s::e_relaxation_share): case of(s::e_relaxation_time): case of(s::e_no_relaxation):
+    case of(s::e_fibres): case of(s::e_direction): return true;
     }
     return false;
 }
@@ -316,6 +321,8 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_no_nodes: return {"pull", " m", true, true};
     case status::e_relaxation_share: return {"tissue", "", true, true};
     case status::e_relaxation_time: return {"tissue", " s", true, true};
+    case status::e_fibres: return {"tissue", "", true, false};
+    case status::e_direction: return {"element", "", false, false};
     case status::e_no_relaxation: return {"entry", " bytes", true, true};
     case status::e_grid: return {"entry", "", true, false};
     default: return {"entry", "", false, false};
@@ -355,7 +362,10 @@ template <class T> struct [[nodiscard]] result {
     add(std::snprintf(at(), left(), "%s", text(code)));
     if (what.index != none) separate(), add(std::snprintf(at(), left(), "%s %lu", means.index, 0ul + what.index));
     if (what.node != none) separate(), add(std::snprintf(at(), left(), "node %lu", 0ul + what.node));
-    if (what.axis < 3 && (code == status::e_relaxation_share || code == status::e_relaxation_time))
+    if (what.axis < 3 && code == status::e_fibres) {
+        const char *const terms[] = {"fibres", "sheets", "coupling"};
+        separate(), add(std::snprintf(at(), left(), "%s", terms[what.axis]));
+    } else if (what.axis < 3 && (code == status::e_relaxation_share || code == status::e_relaxation_time))
         separate(), add(std::snprintf(at(), left(), "term %lu", 0ul + what.axis));
     else if (what.axis < 3)
         separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
@@ -393,6 +403,8 @@ struct body {
     span<const std::uint16_t> tissue_of_element; // with one tissue: empty
     span<const std::uint8_t> removed;            // for each element 1 if it is removed; empty: none is
     span<const supple::prony> prony;             // how each tissue relaxes; empty: none does
+    span<const supple::fibres> fibres;           // of each tissue; empty: none has any
+    span<const float> directions;                // with fibres: six numbers for each element, along fibres and sheets
 };
 
 namespace detail {
@@ -415,8 +427,14 @@ template <class T> bool config_of(const body &from, supple_scene_config &config,
     if (from.removed.size() > 0 && from.removed.size() < elements) return refuse(status::e_short, from.removed.size(), elements);
     if (from.prony.size() > 0 && from.prony.size() < from.tissues.size())
         return refuse(status::e_short, from.prony.size(), from.tissues.size());
+    if (from.fibres.size() > 0 && from.fibres.size() < from.tissues.size())
+        return refuse(status::e_short, from.fibres.size(), from.tissues.size());
+    if (from.directions.size() > 0 && from.directions.size() / 6 < elements)
+        return refuse(status::e_short, from.directions.size(), 6 * elements);
     config = detail::config<supple_scene_config>();
     config.prony = from.prony.size() > 0 ? from.prony.data() : nullptr;
+    config.fibres = from.fibres.size() > 0 ? from.fibres.data() : nullptr;
+    config.directions = from.directions.size() > 0 ? from.directions.data() : nullptr;
     config.removed = from.removed.size() > 0 ? from.removed.data() : nullptr;
     config.law = static_cast<std::uint32_t>(from.law);
     config.winding = static_cast<std::uint32_t>(from.winding);
@@ -444,8 +462,10 @@ public:
 
     // Bytes of memory that are enough to build one; what it then takes of them is in its facts.
     [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, std::uint32_t elements, std::uint32_t tissues = 1,
-                                                    element of = element::nodal_pressure, bool relaxes = false) noexcept {
+                                                    element of = element::nodal_pressure, bool relaxes = false,
+                                                    bool has_fibres = false) noexcept {
         return SUPPLE_SCENE_SIZE(nodes, elements, tissues) + (relaxes ? SUPPLE_PRONY_SIZE(tissues) : 0) +
+               (has_fibres ? SUPPLE_FIBRES_SIZE(nodes, elements, tissues, static_cast<std::uint32_t>(of)) : 0) +
                (of == element::nodal_strain ? SUPPLE_PATCHES_SIZE(nodes, elements, tissues) : 0);
     }
 

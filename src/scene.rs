@@ -159,7 +159,7 @@ impl SceneFacts {
             partitions: &self.partitions,
             tissues: tissue_count(material),
             region: |element| material.region(element),
-            directions: |element| directions_of(material, families, element),
+            directions: |element| directions_of(material, element),
         };
         let capacity = fibres.len();
         let fibres = if families > 0 { fibres } else { &mut [] };
@@ -510,7 +510,7 @@ impl<'a, M: Material> SceneView<'a, M> {
             let families = self.facts.families;
             let tissue = usize::from(self.material.region(element));
             let fibres = self.material.fibres().get(tissue).copied().unwrap_or_default();
-            let directions = directions_of(self.material, families, element);
+            let directions = directions_of(self.material, element);
             // Not known where a host has given them and keeps none.
             let known = families == 0 || !fibres.are_there() || directions != [DVec3::ZERO; 2];
             if known { FibreTangent::new(&fibres, directions, h).kirchhoff_stress() } else { DMat3::NAN }

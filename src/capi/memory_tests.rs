@@ -14,6 +14,7 @@ use std::vec::Vec;
 
 use super::SUPPLE_ABI;
 use super::contact::*;
+use super::fibres::*;
 use super::guard::*;
 use super::large::*;
 use super::learned::*;
@@ -75,13 +76,14 @@ unsafe extern "C" fn each(_: *mut c_void, part: supple_part, work: *const c_void
     }
 }
 
-fn scene(element: u32, prony: &[supple_prony]) -> Memory {
+fn scene(element: u32, prony: &[supple_prony], fibres: &[supple_fibres]) -> Memory {
     let points: Vec<_> = BAR.points().collect();
     let tets: Vec<_> = BAR.tets().collect();
     let mut supports: Vec<_> = (0..9).map(|node| supple_support { node, axes: 7, moves: 0 }).collect();
     supports.push(supple_support { node: NODES - 1, axes: 7, moves: 1 });
     let tissues = [supple_tissue { constants: [59.0, 8.023, 60_000.0, 0.0], density: 1000.0 }; 2];
     let of_element: Vec<_> = (0..ELEMENTS).map(|element| (element % 2) as u16).collect();
+    let directions = [[0.0_f32, 0.0, 2.0, 1.0, 0.0, 0.0]; ELEMENTS as usize];
     let config = supple_scene_config {
         struct_size: size::<supple_scene_config>(),
         abi: SUPPLE_ABI,
@@ -100,10 +102,13 @@ fn scene(element: u32, prony: &[supple_prony]) -> Memory {
         reserved: 0,
         removed: core::ptr::null(),
         prony: if prony.is_empty() { null() } else { prony.as_ptr() },
+        fibres: if fibres.is_empty() { null() } else { fibres.as_ptr() },
+        directions: if fibres.is_empty() { null() } else { directions.as_ptr().cast() },
     };
     let patches = if element == SUPPLE_NODAL_STRAIN { supple_patches_size(NODES, ELEMENTS, 2) } else { 0 };
     let series = if prony.is_empty() { 0 } else { supple_prony_size(2) };
-    let mut memory = Memory::new(supple_scene_size(NODES, ELEMENTS, 2) + patches + series);
+    let of_fibres = if fibres.is_empty() { 0 } else { supple_fibres_size(NODES, ELEMENTS, 2, element) };
+    let mut memory = Memory::new(supple_scene_size(NODES, ELEMENTS, 2) + patches + series + of_fibres);
     let (mut made, mut error) = (null_mut(), supple_error::NONE);
     let (at, bytes) = (memory.at(), memory.bytes());
     // SAFETY: all memory is there, here and below.
@@ -115,11 +120,11 @@ fn scene(element: u32, prony: &[supple_prony]) -> Memory {
     memory
 }
 
-/// All kinds of steps of a scene of these elements, whose two tissues relax, or none does.
-fn host(element: u32, network: &[u8], prony: &[supple_prony]) {
+/// All kinds of steps of a scene of these elements, whose two tissues relax or have fibres, or neither.
+fn host(element: u32, network: &[u8], prony: &[supple_prony], fibres: &[supple_fibres]) {
     let points: Vec<_> = BAR.points().collect();
     let points: *const f32 = points.as_ptr().cast();
-    let (mut scene_memory, mut network) = (scene(element, prony), Memory::of(network));
+    let (mut scene_memory, mut network) = (scene(element, prony, fibres), Memory::of(network));
     let scene: *const supple_scene = scene_memory.at().cast_const().cast();
     let relaxation = supple_relaxation_size(NODES, ELEMENTS, 2, element, prony.len() as u32);
     let mut state_memory = Memory::new(supple_state_size(NODES, element) + relaxation);
@@ -255,17 +260,17 @@ const NETWORK: &[u8] = include_bytes!("../../weights/compact-10.weights");
 
 #[test]
 fn a_host_of_nodal_pressure_stays_within_its_memory() {
-    host(SUPPLE_NODAL_PRESSURE, NETWORK, &[]);
+    host(SUPPLE_NODAL_PRESSURE, NETWORK, &[], &[]);
 }
 
 #[test]
 fn a_host_of_nodal_strain_stays_within_its_memory() {
-    host(SUPPLE_NODAL_STRAIN, NETWORK, &[]);
+    host(SUPPLE_NODAL_STRAIN, NETWORK, &[], &[]);
 }
 
 #[test]
 fn a_host_of_linear_tetrahedra_stays_within_its_memory() {
-    host(SUPPLE_LINEAR, NETWORK, &[]);
+    host(SUPPLE_LINEAR, NETWORK, &[], &[]);
 }
 
 #[test]
@@ -275,6 +280,18 @@ fn a_host_of_tissue_that_relaxes_stays_within_its_memory() {
         supple_prony { share: [0.0; 3], seconds: [0.0; 3] },
     ];
     for element in [SUPPLE_LINEAR, SUPPLE_NODAL_STRAIN] {
-        host(element, NETWORK, &prony);
+        host(element, NETWORK, &prony, &[]);
+    }
+}
+
+#[test]
+fn a_host_of_tissue_with_fibres_stays_within_its_memory() {
+    let none = [0.0; 2];
+    let fibres = [
+        supple_fibres { fibres: [1e3, 10.0], sheets: [5e2, 8.0], coupling: none },
+        supple_fibres { fibres: none, sheets: none, coupling: none },
+    ];
+    for element in [SUPPLE_LINEAR, SUPPLE_NODAL_STRAIN] {
+        host(element, NETWORK, &[], &fibres);
     }
 }

@@ -22,6 +22,8 @@ mod memory;
 
 mod prony;
 
+mod fibres;
+
 mod scene;
 
 mod loads;

@@ -5,7 +5,7 @@ use crate::scene::memory_vectors_for;
 use crate::state::NodeVector;
 
 use super::memory::{self, array};
-use super::scene::{RELAXES, supple_scene_config, tissues_of};
+use super::scene::{EXTENDS, supple_scene_config, tissues_of};
 use super::status::{Answer, supple_error, supple_status};
 use supple_status::*;
 
@@ -67,7 +67,7 @@ pub(super) fn prony_of(tissue: usize, given: &supple_prony) -> Answer<Prony> {
     for ((term, at), (place, (share, seconds))) in found.iter_mut().zip(&mut places).zip(terms) {
         (*term, *at, count) = ([share, seconds], place, count + 1);
     }
-    if !RELAXES && count > 0 {
+    if !EXTENDS && count > 0 {
         return Err(supple_error::from(SUPPLE_E_CHOICE).at(tissue).value(count as f64, 0.0));
     }
     Prony::new(found.get(..count).unwrap_or_default()).map_err(|error| {

@@ -4,14 +4,15 @@ use core::ffi::c_void;
 use core::slice::from_mut;
 
 use crate::copy::copy_apart;
-use crate::element::{ElementTile, NodeInertia, PatchRow};
-use crate::material::{Element, Prony, TissueValues};
+use crate::element::{ElementTile, FibreTile, NodeInertia, PatchRow};
+use crate::material::{Directions, Element, Fibres, Prony, TissueValues};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
 use crate::state::NodeVector;
 use crate::tled;
 
 use super::SUPPLE_NONE;
+use super::fibres::{direction_tiles, fibres_in, fibres_of, supple_fibres, with_fibres};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
 use super::prony::{prony_of, series_of, supple_prony, supple_relaxation_size};
 use super::status::{Answer, mismatch, short, status_of, supple_error, supple_status};
@@ -98,6 +99,13 @@ pub struct supple_scene_config {
     /// How each of the `tissues` relaxes; NULL: none does. Needs more memory: supple_prony_size, supple_relaxation_size.
     /// Only in a library with all laws.
     pub prony: *const supple_prony,
+    /// The fibres of each of the `tissues`; NULL: none has any. Needs more memory: supple_fibres_size. Only in a library with
+    /// all laws.
+    pub fibres: *const supple_fibres,
+    /// With fibres: six numbers for each element, a vector along its fibres and one along its sheets, at rest, of any length but
+    /// zero. The part of the second one along the first is taken off; where the element's tissue has neither sheets nor coupling
+    /// it is not read, and where it has no fibres neither is. Without fibres: NULL.
+    pub directions: *const f32,
 }
 
 /// What is simulated: element tables, masses, supports. After supple_scene_init nothing but supple_set_tissues changes
@@ -110,6 +118,8 @@ pub struct supple_scene {
     tissues: u32,
     /// Entries of the series: all tissues, or none where no tissue relaxes.
     series: u32,
+    /// Entries of fibres: all tissues, or none where no tissue has any.
+    fibres: u32,
     element: Element,
     /// Which of the laws; its constants are those of the tissues.
     law: SceneLaw,
@@ -147,7 +157,7 @@ pub struct supple_scene_facts {
 mod contents {
     use crate::material::Element;
     pub(in crate::capi) use crate::material::{AnyLaw as SceneLaw, AnyMaterial as SceneMaterial};
-    use crate::material::{Prony, TissueValues};
+    use crate::material::{Directions, Fibres, Prony, TissueValues};
 
     /// The elements that there are; the number of each is its place.
     pub(super) const ELEMENTS: &[Element] = &Element::ALL;
@@ -157,16 +167,17 @@ mod contents {
         SceneLaw::all().find(|law| number.checked_mul(2) == Some(law.code()))
     }
 
-    /// Whether tissue may relax.
-    pub(in crate::capi) const RELAXES: bool = true;
+    /// Whether tissue may relax and have fibres.
+    pub(in crate::capi) const EXTENDS: bool = true;
 
     pub(super) const fn material_of<'a>(
         (element, law): (Element, SceneLaw),
         tissues: &'a [TissueValues],
         of_element: &'a [u16],
         prony: &'a [Prony],
+        (fibres, directions): (&'a [Fibres], &'a [Directions]),
     ) -> SceneMaterial<'a> {
-        SceneMaterial { element, law, tissues, of_element, prony, fibres: &[], directions: &[] }
+        SceneMaterial { element, law, tissues, of_element, prony, fibres, directions }
     }
 }
 
@@ -174,7 +185,7 @@ mod contents {
 #[cfg(not(feature = "capi"))]
 mod contents {
     pub(in crate::capi) use crate::material::NeoHookean as SceneLaw;
-    use crate::material::{AnyMaterial, Element, Laws, Material, Prony, Tissue, TissueValues};
+    use crate::material::{AnyMaterial, Directions, Element, Fibres, Laws, Material, Prony, Tissue, TissueValues};
 
     pub(super) const ELEMENTS: &[Element] = &[Element::Linear, Element::NodalPressure];
 
@@ -182,13 +193,14 @@ mod contents {
         (number == 0).then(SceneLaw::default)
     }
 
-    pub(in crate::capi) const RELAXES: bool = false;
+    pub(in crate::capi) const EXTENDS: bool = false;
 
     pub(super) const fn material_of<'a>(
         (element, law): (Element, SceneLaw),
         tissues: &'a [TissueValues],
         of_element: &'a [u16],
         _: &'a [Prony],
+        _: (&'a [Fibres], &'a [Directions]),
     ) -> SceneMaterial<'a> {
         SceneMaterial { element, law, tissues, of_element }
     }
@@ -231,7 +243,7 @@ mod contents {
     }
 }
 use contents::{ELEMENTS, SceneLaw, law_of, material_of};
-pub(super) use contents::{RELAXES, SceneMaterial};
+pub(super) use contents::{EXTENDS, SceneMaterial};
 
 /// A scene in the memory of its object.
 pub(super) struct OpenScene<'a> {
@@ -239,6 +251,7 @@ pub(super) struct OpenScene<'a> {
     nodes: &'a [NodeInertia],
     tiles: &'a [ElementTile],
     patches: &'a [PatchRow],
+    directions: &'a [FibreTile],
     facts: &'a SceneFacts,
     /// What the state of any such scene remembers at most, bytes.
     room_to_remember: usize,
@@ -251,7 +264,7 @@ impl<'a> OpenScene<'a> {
         // SAFETY: the caller's promise; all arrays were written by `build`.
         unsafe {
             memory::is(object)?;
-            let &supple_scene { nodes, elements, tissues, series, element, law, ref facts, .. } = &*object;
+            let &supple_scene { nodes, elements, tissues, series, fibres, element, law, ref facts, .. } = &*object;
             let mut arrays = Arrays::behind(object);
             Ok(Self {
                 nodes: arrays.read(nodes as usize),
@@ -261,10 +274,13 @@ impl<'a> OpenScene<'a> {
                     arrays.read(tissues as usize),
                     arrays.read(regions(elements, tissues)),
                     arrays.read(series as usize),
+                    // Directions by element are not kept: those in tiles are what is computed with.
+                    (arrays.read(fibres as usize), &[]),
                 ),
+                directions: arrays.read(direction_tiles([nodes, elements, tissues], fibres, element)),
                 patches: arrays.read(facts.patch_row_count()),
                 facts,
-                room_to_remember: match RELAXES {
+                room_to_remember: match EXTENDS {
                     true => supple_relaxation_size(nodes, elements, tissues, element.code(), facts.terms() as u32),
                     false => 0,
                 },
@@ -273,7 +289,7 @@ impl<'a> OpenScene<'a> {
     }
 
     pub(super) fn view(&self) -> SceneView<'_, SceneMaterial<'a>> {
-        SceneView::new(&self.material, self.nodes, self.tiles, self.patches, &[], self.facts)
+        SceneView::new(&self.material, self.nodes, self.tiles, self.patches, self.directions, self.facts)
     }
 
     pub(super) const fn node_count(&self) -> usize {
@@ -301,22 +317,42 @@ const fn regions(elements: u32, tissues: u32) -> usize {
     if tissues > 1 { elements as usize } else { 0 }
 }
 
-/// With so many entries of series and rows of patches.
-fn layout(nodes: u32, elements: u32, tissues: u32, series: u32, patch_rows: usize) -> Layout {
-    Layout::of::<supple_scene>()
-        .and::<NodeInertia>(nodes as usize)
-        .and::<ElementTile>(tiles_for(elements as usize))
-        .and::<TissueValues>(tissues as usize)
-        .and::<u16>(regions(elements, tissues))
-        .and::<Prony>(series as usize)
-        .and::<PatchRow>(patch_rows)
+/// How much is in the arrays of a scene.
+#[derive(Clone, Copy)]
+struct Counts {
+    nodes: u32,
+    elements: u32,
+    tissues: u32,
+    /// Entries of series.
+    series: u32,
+    /// Entries of fibres.
+    fibres: u32,
+    element: Element,
+}
+
+impl Counts {
+    fn layout(&self, patch_rows: usize) -> Layout {
+        let &Self { nodes, elements, tissues, series, fibres, element } = self;
+        let layout = Layout::of::<supple_scene>()
+            .and::<NodeInertia>(nodes as usize)
+            .and::<ElementTile>(tiles_for(elements as usize))
+            .and::<TissueValues>(tissues as usize)
+            .and::<u16>(regions(elements, tissues))
+            .and::<Prony>(series as usize);
+        with_fibres(layout, [nodes, elements, tissues], fibres, element).and::<PatchRow>(patch_rows)
+    }
+
+    const fn direction_tiles(&self) -> usize {
+        direction_tiles([self.nodes, self.elements, self.tissues], self.fibres, self.element)
+    }
 }
 
 /// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
-/// With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size.
+/// With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more, with tissue that relaxes supple_prony_size, with fibres
+/// supple_fibres_size.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_scene_size(nodes: u32, elements: u32, tissues: u32) -> usize {
-    layout(nodes, elements, tissues, 0, 0).bytes()
+    Counts { nodes, elements, tissues, series: 0, fibres: 0, element: Element::Linear }.layout(0).bytes()
 }
 
 /// Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any
@@ -330,8 +366,9 @@ pub extern "C" fn supple_patches_size(nodes: u32, elements: u32, tissues: u32) -
 }
 
 /// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, with
-/// tissue that relaxes and supple_prony_size, aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning
-/// of that memory. What it takes of it is told by supple_scene_describe; the rest is free for other use.
+/// tissue that relaxes and supple_prony_size, with fibres and supple_fibres_size, aligned to SUPPLE_ALIGN. On success
+/// `*scene` is the scene, at the beginning of that memory. What it takes of it is told by supple_scene_describe; the rest is
+/// free for other use.
 ///
 /// @param error may be NULL; index is that of an element, a support, a node or a tissue as the status says.
 #[unsafe(no_mangle)]
@@ -347,22 +384,24 @@ pub unsafe extern "C" fn supple_scene_init(
         let (config, scene) = (one(config)?, place_for(scene)?);
         let (law, element, parts) = CheckedBody::checked(config)?;
         let &supple_scene_config { nodes, elements, tissues, .. } = config;
-        let series = parts.series.len() as u32;
-        let without_patches = layout(nodes, elements, tissues, series, 0).bytes();
+        let (series, fibres) = (parts.series.len() as u32, parts.fibres.len() as u32);
+        let counts = Counts { nodes, elements, tissues, series, fibres, element };
+        let without_patches = counts.layout(0).bytes();
         let room = match bytes.min(isize::MAX as usize).checked_sub(without_patches) {
             _ if element != Element::NodalStrain => 0,
             Some(rest) => rest / size_of::<PatchRow>(),
             None => patch_rows_for(nodes as usize, elements as usize, tissues as usize),
         };
-        let place = Place::new(memory, bytes, layout(nodes, elements, tissues, series, room))?;
-        let facts = parts.build(law, element, room, place.arrays::<supple_scene>());
+        let place = Place::new(memory, bytes, counts.layout(room))?;
+        let facts = parts.build(law, &counts, room, place.arrays::<supple_scene>());
         let facts = facts.map_err(|error| match error.status {
             // So far of the patches alone.
             SUPPLE_E_SHORT => short(bytes, without_patches.saturating_add(error.limit as usize)),
             _ => error,
         })?;
-        let place = place.shrunk(layout(nodes, elements, tissues, series, facts.patch_row_count()));
-        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, series, element, law, facts }));
+        let place = place.shrunk(counts.layout(facts.patch_row_count()));
+        let object = |head| supple_scene { head, nodes, elements, tissues, series, fibres, element, law, facts };
+        scene.write(place.put(object));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -376,6 +415,8 @@ struct CheckedBody<'a> {
     tissues: &'a [supple_tissue],
     of_element: &'a [u16],
     series: &'a [supple_prony],
+    fibres: &'a [supple_fibres],
+    directions: &'a [Directions],
 }
 
 impl<'a> CheckedBody<'a> {
@@ -411,9 +452,10 @@ impl<'a> CheckedBody<'a> {
             check_choice(index, support.moves, 1)?;
         }
         // SAFETY: the caller's promise.
-        let (removed, (series, _)) = unsafe { (removed_of(config)?, series_of(config)?) };
+        let (removed, (series, _), (fibres, directions)) =
+            unsafe { (removed_of(config)?, series_of(config)?, fibres_of(config)?) };
         let mesh = Mesh::new(points, tets, winding)?.without(removed)?;
-        Ok((law, element, Self { mesh, supports, tissues, of_element, series }))
+        Ok((law, element, Self { mesh, supports, tissues, of_element, series, fibres, directions }))
     }
 
     /// # Safety
@@ -421,19 +463,21 @@ impl<'a> CheckedBody<'a> {
     unsafe fn build(
         &self,
         law: SceneLaw,
-        element: Element,
+        counts: &Counts,
         patch_rows: usize,
         mut arrays: Arrays,
     ) -> Answer<SceneFacts> {
-        let Self { mesh, supports, tissues: given, of_element, series } = self;
+        let Self { mesh, supports, tissues: given, of_element, series, fibres: given_fibres, directions } = self;
         // SAFETY: the caller's promise; what is not any bits is written before it is read.
-        let (nodes, tiles, tissues, regions, prony, patches) = unsafe {
+        let (nodes, tiles, tissues, regions, prony, fibres, tiles_of_directions, patches) = unsafe {
             (
                 arrays.change::<NodeInertia>(mesh.points().len()),
                 arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
                 arrays.change::<TissueValues>(given.len()),
                 arrays.change::<u16>(of_element.len()),
                 arrays.change::<Prony>(series.len()),
+                arrays.change::<Fibres>(given_fibres.len()),
+                arrays.change::<FibreTile>(counts.direction_tiles()),
                 arrays.change::<PatchRow>(patch_rows),
             )
         };
@@ -446,13 +490,16 @@ impl<'a> CheckedBody<'a> {
         for (tissue, (prony, given)) in prony.iter_mut().zip(*series).enumerate() {
             *prony = prony_of(tissue, given)?;
         }
+        for (tissue, (fibres, given)) in fibres.iter_mut().zip(*given_fibres).enumerate() {
+            *fibres = fibres_in(tissue, given)?;
+        }
         let supports = supports.iter().map(|support| Support {
             node: support.node,
             axes: axes_of(support.axes),
             moves: support.moves == 1,
         });
-        let material = material_of((element, law), tissues, regions, prony);
-        Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches, &mut [])?)
+        let material = material_of((counts.element, law), tissues, regions, prony, (fibres, directions));
+        Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches, tiles_of_directions)?)
     }
 }
 

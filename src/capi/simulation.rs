@@ -19,6 +19,7 @@ use crate::tled::{Pace, vectors_for_pace};
 use super::SUPPLE_NONE;
 use super::adaptive::{self, supple_adaptive, supple_adaptive_init};
 use super::contact::{CallContact, Felt, supple_contact, supple_contact_init, supple_contact_size};
+use super::fibres::{fibres_of, supple_fibres_size};
 use super::guard::{self, supple_estimate, supple_guard, supple_guard_config, supple_guard_init};
 use super::large::{self, LargeRequest, supple_large, supple_large_config, supple_large_init};
 use super::learned::{
@@ -455,7 +456,7 @@ unsafe fn given<'a>(
 unsafe fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> Answer<usize> {
     let &supple_scene_config { nodes, elements, tissues, .. } = body;
     // SAFETY: the caller's promise.
-    let (series, terms) = unsafe { series_of(body)? };
+    let ((series, terms), (fibres, _)) = unsafe { (series_of(body)?, fibres_of(body)?) };
     let remembered = supple_relaxation_size(nodes, elements, tissues, body.element, terms as u32);
     let of_memory = remembered / size_of::<NodeVector>();
     let element = Element::of_code(body.element).unwrap_or_default();
@@ -482,6 +483,7 @@ unsafe fn size_of_all(body: &supple_scene_config, settings: &supple_settings) ->
         layout(nodes).bytes(),
         supple_scene_size(nodes, elements, tissues),
         if series.is_empty() { 0 } else { supple_prony_size(tissues) },
+        if fibres.is_empty() { 0 } else { supple_fibres_size(nodes, elements, tissues, body.element) },
         patches,
         supple_state_size(nodes, body.element),
         remembered,

@@ -150,6 +150,13 @@ pub enum supple_status {
     /// The state is not finite, or so stiff at `node` that no step can be bounded.
     SUPPLE_E_TOO_STIFF = -61,
 
+    /// A constant of the fibres of tissue `index` (value; axis: its term, 0 for fibres, 1 for sheets, 2 for coupling) is not a
+    /// finite positive number.
+    SUPPLE_E_FIBRES = -65,
+    /// The directions of the fibres in element `index` are zero, not finite, or parallel where there are two. Or without an
+    /// index: there are none (value) where so many (limit) are needed.
+    SUPPLE_E_DIRECTION = -66,
+
     /// Not a saved state.
     SUPPLE_E_NOT_SAVED = -70,
     /// A saved state of a version (value) that this library does not read.
@@ -182,8 +189,8 @@ pub enum supple_status {
     SUPPLE_E_NO_CONTACT = -95,
     /// The step was not taken: learned steps do not know pulls.
     SUPPLE_E_NO_PULLS = -96,
-    /// The step was not taken: learned steps do not know tissue that relaxes. Or a state remembers more or fewer bytes
-    /// (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
+    /// The step was not taken: learned steps do not know tissue that relaxes or has fibres. Or a state remembers more or
+    /// fewer bytes (value) than the tissue of the scene needs (limit): supple_state_carry_on, or another state.
     SUPPLE_E_NO_RELAXATION = -97,
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
@@ -202,7 +209,7 @@ pub struct supple_error {
     pub index: u32,
     /// Number of a node, from zero.
     pub node: u32,
-    /// 0, 1, 2 for x, y, z; or of a tissue that relaxes for the terms of its series.
+    /// 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these.
     pub axis: u32,
     /// The offending value; its unit stands with the status.
     pub value: f64,
@@ -297,6 +304,11 @@ impl From<BuildError> for supple_error {
                 let bytes = |rows: usize| rows.saturating_mul(size_of::<PatchRow>());
                 short(bytes(capacity), bytes(needed))
             }
+            BuildError::FibreCapacity { needed, capacity } => room(needed, capacity),
+            BuildError::DirectionCount { directions, elements } => {
+                is(SUPPLE_E_DIRECTION).value(directions as f64, elements as f64)
+            }
+            BuildError::Direction { element, .. } => is(SUPPLE_E_DIRECTION).at(element),
             BuildError::NothingMoves => is(SUPPLE_E_NOTHING_MOVES),
         }
     }
@@ -473,6 +485,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -52 => c"the damping is not that of the training",
         -60 => c"a lattice that cannot be, or a mesh too small for one",
         -61 => c"too stiff, or not finite",
+        -65 => c"a constant of fibres is not a finite positive number",
+        -66 => c"the directions of the fibres in an element are zero, parallel or missing",
         -70 => c"not a saved state",
         -71 => c"a saved state of another version",
         -72 => c"the saved state is damaged",
@@ -486,7 +500,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
-        -97 => c"learned steps do not know tissue that relaxes, or the state has not the memory that such tissue needs",
+        -97 => c"learned steps do not know tissue that relaxes or has fibres, or the state has no memory for what tissue remembers",
         _ => return None,
     })
 }

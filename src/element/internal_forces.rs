@@ -379,10 +379,13 @@ fn visit<R: Real, L: Law>(
     elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
 }
 
+/// What an extension keeps of a vector of elements between the passes.
+type Kept<K, R> = (<K as Extension>::Local<R>, <K as Extension>::Prepared<R>);
+
 /// Between the second and the third pass, for tissue with an extension: its stress takes the place of `h`.
 struct Extend<'a, 'b, R: Real, V, K: Extension> {
     batch: &'a mut [ElementVector<'b, R>],
-    kept: &'a mut [(K::Local<R>, K::Prepared<R>)],
+    kept: &'a mut [Kept<K, R>],
     extension: &'a mut K,
     visitor: PhantomData<V>,
 }

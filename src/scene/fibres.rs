@@ -23,9 +23,10 @@ pub(super) fn families_of(material: &impl Material) -> usize {
 }
 
 /// Unit vectors along the fibres of mesh element `element`, zeros where its tissue has none.
-pub(super) fn directions_of(material: &impl Material, families: usize, element: usize) -> [DVec3; 2] {
+pub(super) fn directions_of(material: &impl Material, element: usize) -> [DVec3; 2] {
+    // Another tissue may need a second direction, which has been checked where the element's own does.
     let given = material.directions().get(element);
-    given.and_then(|given| unit_directions(given, families)).unwrap_or_default()
+    given.and_then(|given| unit_directions(given, 1)).unwrap_or_default()
 }
 
 /// That there are directions wherever fibres are.
@@ -52,12 +53,11 @@ pub(super) fn write_directions(
     tiles: &[ElementTile],
     fibres: &mut [FibreTile],
 ) -> Result<(), BuildError> {
-    let families = families_of(material);
     let (needed, capacity) = (tiles.len(), fibres.len());
     let Some(fibres) = fibres.get_mut(..needed) else { return Err(BuildError::FibreCapacity { needed, capacity }) };
     for (tile, fibres) in tiles.iter().zip(fibres) {
         *fibres = FibreTile::EMPTY;
-        (0..TILE).for_each(|lane| fibres.write(lane, directions_of(material, families, tile.element(lane))));
+        (0..TILE).for_each(|lane| fibres.write(lane, directions_of(material, tile.element(lane))));
     }
     Ok(())
 }

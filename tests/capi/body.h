@@ -62,7 +62,7 @@ static inline supple_scene_config bar_config(void) {
         supports[LAYER + n] = (supple_support){NODES - LAYER + n, 7, 1};
     }
     return (supple_scene_config){SUPPLE_CONFIG(supple_scene_config), SUPPLE_EXPONENTIAL, SUPPLE_WINDING_CHECKED, NODES, TETS,
-                                 2 * LAYER, 1, points[0], tets[0], supports, &tissue, NULL, ELEMENT, 0, NULL, NULL};
+                                 2 * LAYER, 1, points[0], tets[0], supports, &tissue, NULL, ELEMENT, 0, NULL, NULL, NULL, NULL};
 }
 
 #ifdef UNDER_VALGRIND

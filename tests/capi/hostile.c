@@ -82,7 +82,8 @@ static struct {
     int written;
 } slots[SLOTS];
 static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, of_removed,
-    of_places, of_found, of_field, of_scratch, of_prony, copies[2];
+    of_places, of_found, of_field, of_scratch, of_prony, of_fibres, of_directions,
+    copies[2];
 static size_t weights_bytes, damper_bytes;
 static uint32_t of_bar[4 * TETS][3], bar_triangles;
 static const char *doing;
@@ -211,7 +212,8 @@ static supple_scene_config changed_bar(void) {
         }
     }
     supple_scene_config config = {SUPPLE_CONFIG(supple_scene_config), law, number(below(2)), nodes, elements, supports_there,
-                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0, NULL, NULL};
+                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0, NULL, NULL,
+                                  NULL, NULL};
     if (one_in(4)) {
         uint8_t *removed = end_of(&of_removed, elements);
         for (uint32_t n = 0; n < elements; n++) removed[n] = one_in(10);
@@ -228,6 +230,22 @@ static supple_scene_config changed_bar(void) {
         }
         config.prony = series;
     }
+    if (one_in(3)) {
+        supple_fibres *fibres = end_of(&of_fibres, sizeof *fibres * tissues_there);
+        float *directions = end_of(&of_directions, 24 * elements);
+        for (uint32_t n = 0; n < tissues_there; n++) {
+            float *const terms[3] = {fibres[n].fibres, fibres[n].sheets, fibres[n].coupling};
+            for (int term = 0; term < 3; term++) {
+                terms[term][0] = one_in(2) ? 0.0f : one_in(60) ? wild(1e3f) : (float)below(20000);
+                terms[term][1] = one_in(60) ? wild(10.0f) : 10.0f;
+            }
+        }
+        for (uint32_t n = 0; n < 6 * elements; n++) {
+            directions[n] = one_in(2000) ? wild(1.0f) : (float)below(2000) - 1000.0f;
+        }
+        if (one_in(10) && elements > 0) memset(directions + 6 * below(elements), 0, 24);
+        config.fibres = fibres, config.directions = directions;
+    }
     config.struct_size = number(config.struct_size), config.abi = number(config.abi), config.reserved = number(0);
     /* Fewer than there are, or none: more would be memory that is not the host's. */
     config.supports = one_in(20) ? below(supports_there + 1) : config.supports;
@@ -235,10 +253,11 @@ static supple_scene_config changed_bar(void) {
     config.nodes = one_in(20) ? below(nodes + 1) : config.nodes;
     config.tissues = one_in(20) ? below(tissues_there + 1) : config.tissues;
     if (one_in(40)) {
-        const void **const pointers[6] = {(const void **)&config.points, (const void **)&config.tetrahedra, (const void **)&config.support,
+        const void **const pointers[8] = {(const void **)&config.points, (const void **)&config.tetrahedra, (const void **)&config.support,
                                           (const void **)&config.tissue, (const void **)&config.tissue_of_element,
-                                          (const void **)&config.prony};
-        const void **pointer = pointers[below(6)];
+                                          (const void **)&config.prony, (const void **)&config.fibres,
+                                          (const void **)&config.directions};
+        const void **pointer = pointers[below(8)];
         *pointer = one_in(2) || *pointer == NULL ? NULL : (const void *)((const char *)*pointer - 1);
     }
     return config;
@@ -249,6 +268,7 @@ static supple_status make_scene(void) {
     size_t needed = supple_scene_size(config.nodes, config.elements, config.tissues), bytes;
     needed += config.element == SUPPLE_NODAL_STRAIN ? supple_patches_size(config.nodes, config.elements, config.tissues) : 0;
     needed += config.prony != NULL ? supple_prony_size(config.tissues) : 0;
+    needed += config.fibres != NULL ? supple_fibres_size(config.nodes, config.elements, config.tissues, config.element) : 0;
     supple_scene *made = NULL;
     void *at = room(SCENE, needed, &bytes);
     return supple_scene_init(at, bytes, one_in(60) ? NULL : &config, one_in(60) ? NULL : &made, wanted());
@@ -1186,7 +1206,7 @@ int main(int argc, char **argv) {
     of_removed = arena_of(TETS), of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
     of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 16);
-    of_prony = arena_of(2 * sizeof(supple_prony));
+    of_prony = arena_of(2 * sizeof(supple_prony)), of_fibres = arena_of(2 * sizeof(supple_fibres)), of_directions = arena_of(24 * TETS);
     of_rest = arena_of(supple_settle_size(NODES) + 64);
     of_places = arena_of(PLACES * sizeof(supple_followed_point)), of_found = arena_of(16 * TETS);
     of_field = arena_of(12 * SIDE * SIDE * SIDE), of_scratch = arena_of(1 << 16);

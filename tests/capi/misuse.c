@@ -91,6 +91,53 @@ static supple_status scene_with(supple_scene_config config) {
     return status;
 }
 
+/* Of two tissues the second one, that of element 17, has fibres and sheets, the first one only fibres. */
+static void fibres(supple_scene_config bad, const uint16_t *of_element) {
+    static supple_fibres fibres[2] = {{{1e3f, 10.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}}, {{1e3f, 10.0f}, {1e3f, 10.0f}, {1e2f, 5.0f}}};
+    static float directions[TETS][2][3];
+    for (int e = 0; e < TETS; e++) directions[e][0][0] = 2.0f, directions[e][1][1] = of_element[e] == 1 ? 0.1f : 0.0f;
+    bad.fibres = fibres, bad.directions = directions[0][0];
+    DONE(scene_with(bad));
+#define FIBRES(field, wrong, at)                                                                                       \
+    do {                                                                                                               \
+        const float kept = fibres[1].field;                                                                            \
+        fibres[1].field = (wrong);                                                                                     \
+        REFUSED(SUPPLE_E_FIBRES, scene_with(bad));                                                                     \
+        CHECK(error.index == 1 && error.axis == (at));                                                                  \
+        CHECK((float)error.value == fibres[1].field || (isnan(error.value) && isnan(fibres[1].field)));                \
+        fibres[1].field = kept;                                                                                        \
+    } while (0)
+    FIBRES(fibres[0], -1.0f, 0);
+    FIBRES(fibres[1], 0.0f, 0);
+    FIBRES(sheets[0], NAN, 1);
+    FIBRES(sheets[1], INFINITY, 1);
+    FIBRES(coupling[1], 0.0f, 2);
+    FIBRES(coupling[0], -INFINITY, 2);
+#define DIRECTION(place, component, wrong)                                                                             \
+    do {                                                                                                               \
+        const float kept = (place)[component];                                                                         \
+        (place)[component] = (wrong);                                                                                  \
+        REFUSED(SUPPLE_E_DIRECTION, scene_with(bad));                                                                  \
+        CHECK(error.index == 17 && error.value == 0.0 && error.limit == 0.0);                                          \
+        (place)[component] = kept;                                                                                     \
+    } while (0)
+    DIRECTION(directions[17][0], 0, 0.0f);
+    DIRECTION(directions[17][0], 2, NAN);
+    DIRECTION(directions[17][0], 1, INFINITY);
+    DIRECTION(directions[17][1], 1, 0.0f);
+    directions[17][1][0] = 1.0f;
+    DONE(scene_with(bad));
+    DIRECTION(directions[17][1], 1, 0.0f);
+    DIRECTION(directions[17][1], 1, NAN);
+    bad.directions = NULL;
+    REFUSED(SUPPLE_E_DIRECTION, scene_with(bad));
+    CHECK(error.index == SUPPLE_NONE && error.value == 0.0 && error.limit == TETS);
+    bad.directions = (const float *)(const void *)((const char *)directions + 2);
+    REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+    bad.fibres = (const supple_fibres *)(const void *)((const char *)fibres + 2);
+    REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+}
+
 static void scenes(void) {
     const supple_scene_config good = bar_config();
     supple_scene_config bad = good;
@@ -162,6 +209,8 @@ static void scenes(void) {
     RELAXES(SUPPLE_E_RELAXATION_TIME, seconds[2], NAN, 2, 1e-6f);
     bad.prony = (const supple_prony *)(const void *)((const char *)series + 2);
     REFUSED(SUPPLE_E_MISALIGNED, scene_with(bad));
+    bad.prony = NULL;
+    fibres(bad, of_element);
 
 #define MESH(expected, place, value)                                                                                   \
     do {                                                                                                               \
@@ -1193,6 +1242,35 @@ static void relaxing_tissue(supple_scene_config config) {
     REFUSED(SUPPLE_E_NULL, supple_state_saved_size(remembering, NULL));
 }
 
+/* Nor do they know fibres. */
+static void fibrous_tissue(supple_scene_config config) {
+    const supple_fibres fibres = {{1e3f, 10.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}};
+    static float directions[TETS][6];
+    for (int e = 0; e < TETS; e++) directions[e][2] = 1.0f;
+    config.fibres = &fibres, config.directions = directions[0];
+    const size_t of_scene = SUPPLE_SCENE_SIZE(NODES, TETS, 1) + SUPPLE_FIBRES_SIZE(NODES, TETS, 1, ELEMENT);
+    const size_t of_learned = SUPPLE_LEARNED_SIZE(NODES, 1), of_state = SUPPLE_STATE_SIZE(NODES, ELEMENT);
+    CHECK(of_scene + of_state + of_learned <= sizeof spare);
+    supple_scene *fibrous;
+    supple_state *its_state;
+    supple_learned *network;
+    supple_learned_facts facts;
+    DONE(supple_scene_init(spare, of_scene, &config, &fibrous, NULL));
+    DONE(supple_state_init(spare + of_scene, of_state, fibrous, &its_state));
+    for (uint32_t fallback = 0; fallback < 2; fallback++) {
+        const supple_learned_config given = {SUPPLE_CONFIG(supple_learned_config), fallback, 0, weights, sizeof weights};
+        DONE(supple_learned_init(spare + of_scene + of_state, of_learned, fibrous, &given, &network, NULL));
+        DONE(supple_learned_describe(network, &facts));
+        const supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 10.0f, facts.damping};
+        DONE(supple_set_step(fibrous, its_state, &exact, NULL));
+        DONE(supple_state_reset(its_state));
+        DONE(supple_learned_lead(fibrous, NULL, its_state, network, 5 * (double)facts.seconds, NULL, NULL));
+        const supple_status told = supple_learned_step(fibrous, NULL, its_state, network, 1, NULL, NULL);
+        note(told);
+        CHECK(told == (fallback ? SUPPLE_FELL_BACK : SUPPLE_E_NO_RELAXATION));
+    }
+}
+
 static void images(void) {
     static supple_followed_point located[2];
     static float places[2][3] = {{0.01f, 0.01f, 0.01f}, {0.01f, 0.01f, -0.01f}}, moved[2][3], field[3 * 27];
@@ -1305,6 +1383,7 @@ int main(int argc, char **argv) {
     contacts();
     pulls();
     relaxing_tissue(config);
+    fibrous_tissue(config);
     remarks(config);
     little_work(&config);
     DONE(supple_state_reset(state));

@@ -36,7 +36,7 @@ find_python() {
 programs() {
     cargo build --quiet --release
     local test options element
-    for test in misuse sizes copies simulation exchange relaxation switching points heap threads stack; do
+    for test in misuse sizes copies simulation exchange relaxation fibres switching points heap threads stack; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         for element in SUPPLE_NODAL_PRESSURE SUPPLE_LINEAR; do
@@ -44,7 +44,7 @@ programs() {
             "$folder/$test"
         done
     done
-    for test in sizes copies simulation exchange relaxation switching points heap threads stack strain; do
+    for test in sizes copies simulation exchange relaxation fibres switching points heap threads stack strain; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         gcc -std=c11 "${warnings[@]}" "${options[@]}" -DELEMENT=SUPPLE_NODAL_STRAIN tests/capi/$test.c "$static" -o "$folder/$test-strain"
@@ -130,15 +130,15 @@ SCENE
 
 memory() {
     local test options element
-    for test in misuse copies simulation exchange relaxation points heap strain threads; do
+    for test in misuse copies simulation exchange relaxation fibres points heap strain threads; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL -DUNDER_VALGRIND tests/capi/$test.c "$static" -o "$folder/$test-small"
     done
-    for test in misuse copies simulation exchange relaxation points heap strain; do
+    for test in misuse copies simulation exchange relaxation fibres points heap strain; do
         valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"
     done
-    echo "valgrind: no error in misuse, copies, simulation, exchange, relaxation, points, heap, strain"
+    echo "valgrind: no error in misuse, copies, simulation, exchange, relaxation, fibres, points, heap, strain"
     valgrind --quiet --error-exitcode=9 --tool=helgrind "$folder/threads-small" >"$folder/said"
     echo "helgrind: no race in threads"
 
@@ -146,15 +146,15 @@ memory() {
     # has no sanitizers in a stable compiler, so within the library it is valgrind, and memory that must not be touched around every object
     # of the random calls.
     sanitized=(-fsanitize=address,undefined -fno-sanitize-recover=all)
-    for test in misuse copies simulation exchange relaxation points strain hostile; do
+    for test in misuse copies simulation exchange relaxation fibres points strain hostile; do
         element=()
         [ $test != strain ] || element=(-DELEMENT=SUPPLE_NODAL_STRAIN)
         gcc -std=c11 "${warnings[@]}" -O1 "${sanitized[@]}" -DSMALL "${element[@]}" tests/capi/$test.c "$static" -lm -o "$folder/$test-sanitized"
     done
-    for test in misuse copies simulation exchange relaxation points strain; do
+    for test in misuse copies simulation exchange relaxation fibres points strain; do
         "$folder/$test-sanitized" >"$folder/said"
     done
-    echo "sanitizers: no error in misuse, copies, simulation, exchange, relaxation, points, strain"
+    echo "sanitizers: no error in misuse, copies, simulation, exchange, relaxation, fibres, points, strain"
     "$folder/hostile-sanitized" 10000
 }
 

@@ -36,6 +36,7 @@ int main(void) {
                 CHECK(supple_prony_size(tissues) == SUPPLE_PRONY_SIZE(tissues));
                 for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_STRAIN; element++) {
                     const uint32_t terms = tissues % 4;
+                    CHECK(supple_fibres_size(nodes, elements, tissues, element) == SUPPLE_FIBRES_SIZE(nodes, elements, tissues, element));
                     CHECK(supple_relaxation_size(nodes, elements, tissues, element, terms) ==
                           SUPPLE_RELAXATION_SIZE(nodes, elements, tissues, element, terms));
                 }

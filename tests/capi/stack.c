@@ -140,11 +140,11 @@ int main(void) {
         size_t most;
     } calls[] = {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
-        {"set_step", set_step, 20},     {"step", exact, 24},               {"learned_init", init_learned, 12},
+        {"set_step", set_step, 21},     {"step", exact, 24},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
-        {"guard_init", init_guard, 38},    {"guard_follow", follow, 40},
-        {"adaptive_init", init_adaptive, 42}, {"adaptive_advance", advance, 42},
-        {"sim_setup", sim_setup, 45}, {"sim_advance", sim_advance, 42},
+        {"guard_init", init_guard, 40},    {"guard_follow", follow, 40},
+        {"adaptive_init", init_adaptive, 44}, {"adaptive_advance", advance, 42},
+        {"sim_setup", sim_setup, 47}, {"sim_advance", sim_advance, 42},
         {"locate", locate_and_follow, 3}, {"displacement_field", field, 10},
     };
     const size_t count = sizeof calls / sizeof *calls;

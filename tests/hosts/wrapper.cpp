@@ -530,6 +530,42 @@ void relaxes() {
     EXPECT(supple::scene::make(place, body).status == status::e_short);
 }
 
+// A cube with fibres: sizes, what holds it, and the sentences for fibres that cannot be.
+void has_fibres() {
+    const grid cube(3);
+    supple::body body = cube.body();
+    supple::fibres fibres{{2e4f, 16}, {0, 0}, {0, 0}};
+    std::vector<float> directions;
+    for (int element = 0; element < 162; element++)
+        for (const float component : {0.0f, 0.0f, 2.0f, 1.0f, 0.0f, 0.0f}) directions.push_back(component);
+    body.fibres = {&fibres, 1}, body.directions = directions;
+    const std::size_t room = supple::scene::size(64, 162, 1, supple::element::nodal_pressure, false, true);
+    EXPECT(room > supple::scene::size(64, 162));
+    std::vector<supple::line> place(supple::lines(room)), of_state(supple::lines(supple::state::size(64)));
+    EXPECT(supple::scene::make({place.data(), supple::scene::size(64, 162)}, body).status == status::e_short);
+    const auto scene = supple::scene::make(place, body);
+    const auto facts = scene.value.describe();
+    EXPECT(scene && facts && facts.value.bytes == room);
+    const auto state = supple::state::make(of_state, scene.value);
+    EXPECT(state && is_done(state.value.set_step(scene.value, 1e-4f, 0)));
+    EXPECT(is_done(state.value.step(scene.value, {}, 3)));
+    fibres.fibres[1] = -16;
+    EXPECT_SENTENCE(supple::scene::make(place, body).error, "a constant of fibres is not a finite positive number: tissue 0, fibres, -16");
+    fibres.fibres[1] = 16, fibres.coupling[0] = 200;
+    EXPECT_SENTENCE(supple::scene::make(place, body).error,
+                    "a constant of fibres is not a finite positive number: tissue 0, coupling, 0");
+    fibres.coupling[1] = 11, directions[6 * 7 + 3] = 0;
+    EXPECT_SENTENCE(supple::scene::make(place, body).error, "the directions of the fibres in an element are zero, parallel or missing: element 7");
+    body.directions = {directions.data(), 6 * 161};
+    EXPECT(supple::scene::make(place, body).status == status::e_short);
+    body.directions = {};
+    EXPECT_SENTENCE(supple::scene::make(place, body).error, "the directions of the fibres in an element are zero, parallel or missing");
+    const supple::tissue two[] = {tissue, tissue};
+    const std::vector<std::uint16_t> of_element(162);
+    body.tissues = two, body.tissue_of_element = of_element;
+    EXPECT(supple::scene::make(place, body).status == status::e_short);
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -565,6 +601,7 @@ int main(int count, char **words) {
     changed();
     thin();
     relaxes();
+    has_fibres();
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;
 }

@@ -19,7 +19,7 @@ if lib.supple_abi() != lib.SUPPLE_ABI:
 # Statuses of steps that were refused.
 _DIVERGED = range(lib.SUPPLE_E_DIVERGED_PRESSURE, lib.SUPPLE_E_DIVERGED + 1)
 # Of which an axis is a term.
-_OF_TERMS = (lib.SUPPLE_E_RELAXATION_SHARE, lib.SUPPLE_E_RELAXATION_TIME)
+_OF_TERMS = (lib.SUPPLE_E_RELAXATION_SHARE, lib.SUPPLE_E_RELAXATION_TIME, lib.SUPPLE_E_FIBRES)
 
 
 def words(status: int) -> str:

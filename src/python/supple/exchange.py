@@ -82,12 +82,12 @@ def ablated(simulation: Simulation, elements: ArrayLike, material: Material, sec
     # Of each tissue its ablated part becomes one of its own.
     of_element, parts = scene._tissue_of_element.copy(), np.unique(scene._tissue_of_element[numbers])
     first = len(scene._tissues)
-    tissues, prony = (np.concatenate([rows, rows[parts]]) for rows in (scene._tissues, scene._prony))
     of_element[numbers] = first + np.searchsorted(parts, scene._tissue_of_element[numbers])
-    exchanged(simulation, scene._changed(scene._removed, tissues, prony, of_element))
+    divided = scene._divided(parts, of_element)
+    exchanged(simulation, divided)
     now = simulation.time
-    for place in range(first, len(tissues)):
-        simulation._ablations.append(Ablation(place, tissues["constants"][place].copy(), end, now, seconds))
+    for place in range(first, len(divided._tissues)):
+        simulation._ablations.append(Ablation(place, divided._tissues["constants"][place].copy(), end, now, seconds))
 
 
 def next_stage(simulation: Simulation) -> None:

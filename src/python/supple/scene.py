@@ -19,6 +19,9 @@ from .mesh import Mesh, boundary_of
 _TISSUE = np.dtype([("constants", np.float32, 4), ("density", np.float32)])
 # As supple_prony.
 _PRONY = np.dtype([("share", np.float32, 3), ("seconds", np.float32, 3)])
+# As supple_fibres.
+_TERMS = ("fibres", "sheets", "coupling")
+_FIBRES = np.dtype([(term, np.float32, 2) for term in _TERMS])
 ELEMENTS = {"linear": lib.SUPPLE_LINEAR, "nodal-pressure": lib.SUPPLE_NODAL_PRESSURE, "nodal-strain": lib.SUPPLE_NODAL_STRAIN}
 
 
@@ -34,9 +37,22 @@ class Material:
 
     With `prony=[[0.5, 1.0], [0.2, 30.0]]` it relaxes: of the stress that changes the shape a share of 0.5 with the time 1 s, 0.2 with 30 s.
     The constants are those of a motion that is over before anything relaxes; pressure does not relax. At most three terms, 0.99 in sum.
+
+    With `fibres=[a, b]` (a in Pa, b without unit) it has fibres along the `directions` of the scene, which resist where they are longer than
+    at rest; `sheets=[a, b]` are a second family, `coupling=[a, b]` resists the shear between both.
     """
 
-    def __init__(self, law: str, *, density: float, prony: ArrayLike = (), **constants: float) -> None:
+    def __init__(
+        self,
+        law: str,
+        *,
+        density: float,
+        prony: ArrayLike = (),
+        fibres: ArrayLike = (),
+        sheets: ArrayLike = (),
+        coupling: ArrayLike = (),
+        **constants: float,
+    ) -> None:
         if law not in LAWS:
             raise InputError(f"law {law!r}: there are {', '.join(LAWS)}")
         self.law, self.density = law, float(density)
@@ -45,19 +61,33 @@ class Material:
             raise InputError(f"constants of {law}: {', '.join(constants) or 'none'} are given, {', '.join(names)} are needed")
         self.constants = {name: float(constants[name]) for name in names}
         self.prony = _terms_of(prony)
+        self.fibres, self.sheets, self.coupling = (_term_of(each, name) for each, name in zip((fibres, sheets, coupling), _TERMS))
 
     @classmethod
-    def from_moduli(cls, young: float, poisson: float, *, density: float, prony: ArrayLike = ()) -> Material:
-        """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus."""
+    def from_moduli(
+        cls,
+        young: float,
+        poisson: float,
+        *,
+        density: float,
+        prony: ArrayLike = (),
+        fibres: ArrayLike = (),
+        sheets: ArrayLike = (),
+        coupling: ArrayLike = (),
+    ) -> Material:
+        """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus.
+        Those are of the tissue without its fibres."""
         if not -1.0 < poisson < 0.5:
             raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
         c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))
-        return cls("neo-hookean", c=c, d=d, density=density, prony=prony)
+        return cls("neo-hookean", c=c, d=d, density=density, prony=prony, fibres=fibres, sheets=sheets, coupling=coupling)
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name}={value:g}" for name, value in self.constants.items())
         relaxes = f", relaxes by {', '.join(f'{share:g} in {seconds:g} s' for share, seconds in self.prony)}" if self.prony else ""
-        return f"<supple.Material: {self.law}, {constants}, {self.density:g} kg/m^3{relaxes}>"
+        terms = zip(_TERMS, (self.fibres, self.sheets, self.coupling))
+        fibres = "".join(f", {name} a={term[0]:g}, b={term[1]:g}" for name, term in terms if term)
+        return f"<supple.Material: {self.law}, {constants}, {self.density:g} kg/m^3{relaxes}{fibres}>"
 
 
 def _terms_of(prony: ArrayLike) -> list[tuple[float, float]]:
@@ -74,6 +104,22 @@ def _terms_of(prony: ArrayLike) -> list[tuple[float, float]]:
     return [(float(share), float(seconds)) for share, seconds in terms]
 
 
+def _term_of(term: ArrayLike, name: str) -> tuple[float, float] | None:
+    """The constants a (Pa) and b of a term of fibres, or nothing."""
+    try:
+        values = np.asarray(term, np.float64)
+    except (TypeError, ValueError) as problem:
+        raise InputError(f"{name}: not two numbers, a (Pa) and b: {problem}") from None
+    if values.size == 0:
+        return None
+    if values.shape != (2,):
+        raise InputError(f"{name}: its shape is {values.shape}, it must be two numbers, a (Pa) and b")
+    for constant, value in zip("ab", values):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(f"{name}: {constant} is {value:g}, it must be a finite positive number; without such a term leave it out")
+    return float(values[0]), float(values[1])
+
+
 class Scene:
     """A mesh of one tissue, or of several of the same law.
 
@@ -85,6 +131,8 @@ class Scene:
     moved : nodes that will be held where `Simulation.set_motions` says
     element : "nodal-strain" (nearest to nature on coarse meshes), "nodal-pressure" (stays whole in deep dents of tissue that stiffens), or "linear" (locks in nearly incompressible tissue)
     axes : along which the fixed nodes are held
+    directions : of the fibres of each element, at rest, of any length but zero: of shape (elements, 3); with sheets or coupling of shape
+        (elements, 2, 3), along fibres and sheets, of which the part along the fibres is taken off. Not read where a tissue has none
     removed : elements that are not there, as numbers or as a mask over all, as after a resection: nodes and elements keep their numbers, and
         nodes without an element are held
     """
@@ -99,12 +147,14 @@ class Scene:
         element: str = "nodal-strain",
         axes: str = "xyz",
         removed: ArrayLike = (),
+        directions: ArrayLike | None = None,
     ) -> None:
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
         self._supports = self._supports_of(fixed, moved, axes)
-        self._law, self._tissues, self._prony, self._tissue_of_element = self._tissues_of(material)
+        self._law, self._tissues, self._prony, self._fibres, self._tissue_of_element = self._tissues_of(material)
+        self._directions = _directions_of(directions, self._fibres, self._tissue_of_element)
         self._removed = np.zeros(len(mesh.tets), np.uint8)
         self._removed[library.node_numbers(removed, len(mesh.tets), "removed", "element")] = 1
         self._build()
@@ -123,6 +173,9 @@ class Scene:
         relaxes = bool(self._prony["share"].any())
         if relaxes:
             made.prony = library.pointer("supple_prony", self._prony)
+        if len(self._directions):
+            made.fibres = library.pointer("supple_fibres", self._fibres)
+            made.directions = library.pointer("float", self._directions)
         if self._removed.any():
             made.removed = library.pointer("uint8_t", self._removed)
         self._config = made
@@ -132,6 +185,8 @@ class Scene:
             size += lib.supple_patches_size(nodes, elements, tissues)
         if relaxes:
             size += lib.supple_prony_size(tissues)
+        if len(self._directions):
+            size += lib.supple_fibres_size(nodes, elements, tissues, made.element)
         memory = library.Memory(size)
         scene, error = ffi.new("supple_scene **"), library.new_error()
         library.checked(lib.supple_scene_init(memory.pointer, size, made, scene, error), error, "the scene")
@@ -139,20 +194,28 @@ class Scene:
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
 
-    def _changed(
-        self, removed: NDArray[np.uint8], tissues: NDArray[np.void], prony: NDArray[np.void], of_element: NDArray[np.uint16]
-    ) -> Scene:
+    def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)
         made.__dict__.pop("_boundary", None)
-        made._removed, made._tissues, made._prony, made._tissue_of_element = removed, tissues, prony, of_element
+        made._removed = removed
+        made._build()
+        return made
+
+    def _divided(self, parts: NDArray[np.uint16], of_element: NDArray[np.uint16]) -> Scene:
+        """Another one, in which each tissue of `parts` is there once more, behind the others."""
+        made = copy.copy(self)
+        made._tissues, made._prony, made._fibres = (
+            np.concatenate([rows, rows[parts]]) for rows in (self._tissues, self._prony, self._fibres)
+        )
+        made._tissue_of_element = of_element
         made._build()
         return made
 
     def _tissues_of(
         self, material: Material | Mapping[int, Material]
-    ) -> tuple[int, NDArray[np.void], NDArray[np.void], NDArray[np.uint16]]:
-        """The law, the tissues, how each relaxes, and of which each element is."""
+    ) -> tuple[int, NDArray[np.void], NDArray[np.void], NDArray[np.void], NDArray[np.uint16]]:
+        """The law, the tissues, how each relaxes, its fibres, and of which each element is."""
         regions, of_element = self.mesh.regions, np.zeros(len(self.mesh.tets), np.uint16)
         if isinstance(material, Material):
             materials = [material]
@@ -167,12 +230,14 @@ class Scene:
             of_element = np.searchsorted(known, regions).astype(np.uint16)
             if len({each.law for each in materials}) != 1:
                 raise InputError(f"materials of regions: all must be of one law, not {', '.join(each.law for each in materials)}")
-        rows, series = np.zeros(len(materials), _TISSUE), np.zeros(len(materials), _PRONY)
-        for row, relaxing, each in zip(rows, series, materials):
+        rows, series, fibres = (np.zeros(len(materials), kind) for kind in (_TISSUE, _PRONY, _FIBRES))
+        for row, relaxing, fibrous, each in zip(rows, series, fibres, materials):
             row["constants"][: len(each.constants)], row["density"] = list(each.constants.values()), each.density
             for place, (share, seconds) in enumerate(each.prony):
                 relaxing["share"][place], relaxing["seconds"][place] = share, seconds
-        return materials[0]._number, rows, series, of_element
+            for name, term in zip(_TERMS, (each.fibres, each.sheets, each.coupling)):
+                fibrous[name] = term or (0.0, 0.0)
+        return materials[0]._number, rows, series, fibres, of_element
 
     @functools.cached_property
     def _boundary(self) -> NDArray[np.uint32]:
@@ -202,3 +267,39 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<supple.Scene: {self.mesh!r}, {self.material!r}, {self.element}>"
+
+
+def _directions_of(directions: ArrayLike | None, fibres: NDArray[np.void], of_element: NDArray[np.uint16]) -> NDArray[np.float32]:
+    """Along fibres and sheets of each element, of shape (elements, 2, 3); of shape (0, 2, 3) where no tissue has fibres."""
+    elements = len(of_element)
+    needs_two = (fibres["sheets"][:, 0] > 0.0) | (fibres["coupling"][:, 0] > 0.0)
+    needs_one = needs_two | (fibres["fibres"][:, 0] > 0.0)
+    shape = f"({elements}, 2, 3), along fibres and sheets" if needs_two.any() else f"({elements}, 3) or ({elements}, 2, 3)"
+    if directions is None:
+        if needs_one.any():
+            raise InputError(f"directions: there are none, and a material has fibres: give an array of shape {shape}")
+        return np.zeros((0, 2, 3), np.float32)
+    if not needs_one.any():
+        raise InputError("directions: no material has fibres: give it some (fibres=[a, b]), or leave the directions out")
+    try:
+        given = np.asarray(directions, np.float32)
+    except (TypeError, ValueError) as problem:
+        raise InputError(f"directions: not an array of numbers: {problem}") from None
+    if given.shape != (elements, 2, 3) and (needs_two.any() or given.shape != (elements, 3)):
+        raise InputError(f"directions: their shape is {given.shape}, it must be {shape}")
+    made = np.zeros((elements, 2, 3), np.float32)
+    if given.ndim == 3:
+        made[:] = given
+    else:
+        made[:, 0] = given
+    # As the kernel has it, which names no values.
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(made.astype(np.float64), axis=2)
+        fibre, sheet = np.moveaxis(made / length[:, :, None], 1, 0)
+        is_one, is_two = np.isfinite(fibre).all(axis=1), np.linalg.norm(np.cross(fibre, sheet), axis=1) > 1e-4
+    bad = np.flatnonzero((needs_one[of_element] & ~is_one) | (needs_two[of_element] & ~is_two))
+    if len(bad):
+        raise InputError(
+            f"directions: of element {bad[0]} {given[bad[0]].tolist()}: they must be finite and not zero, and those of fibres and sheets not parallel"
+        )
+    return made

@@ -452,12 +452,12 @@ class Simulation:
         scene = self.scene
         removed = scene._removed.copy()
         removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
-        exchanged(self, scene._changed(removed, scene._tissues, scene._prony, scene._tissue_of_element))
+        exchanged(self, scene._without(removed))
 
     @_one_at_a_time
     def ablate(self, elements: ArrayLike, material: Material, seconds: float) -> None:
         """Lets the constants of some elements, as numbers or as a mask, change evenly to those of a material of the same law over so many
-        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities and relaxation stay. See `exchange`."""
+        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities, relaxation and fibres stay. See `exchange`."""
         ablated(self, elements, material, seconds)
 
     # Supports.
