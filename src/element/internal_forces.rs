@@ -396,7 +396,8 @@ impl<R: Real, V: ElementVisitor, K: Extension> Piece for Extend<'_, '_, R, V, K>
     #[inline(always)]
     fn run(self) {
         let Self { batch, kept, extension, .. } = self;
-        for (elements, (local, prepared)) in batch.iter_mut().zip(&mut *kept) {
+        let first_pass = if extension.prepares() { batch.len() } else { 0 };
+        for (elements, (local, prepared)) in batch.iter_mut().zip(&mut *kept).take(first_pass) {
             let ElementVector { tile, first, h, invariants, .. } = *elements;
             let element = |lane: usize| tile.element(first + lane);
             let bound;

@@ -64,7 +64,7 @@ pub(crate) use crushed::{
 };
 #[cfg(feature = "std")]
 pub(crate) use extension::place_in;
-pub(crate) use extension::{Extended, NoExtension};
+pub(crate) use extension::{Extended, NoExtension, extension_operations};
 pub(crate) use fibre_bounds::{add_fibre_bounds, add_fibre_tangents, add_patch_fibre_bounds, add_patch_fibre_tangents};
 pub(crate) use fibre_tangent::FibreTangent;
 pub(crate) use fibres::{Fibrous, unit_directions};

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{BuildError, SceneView, tiles_for};
+use super::{BuildError, SceneFacts, SceneView, tiles_for};
 use crate::element::{ElementTile, FibreTile, Fibrous, patch_tiles_for, unit_directions};
 use crate::material::{Element, Fibres, Laws, Material};
 use crate::simd::TILE;
@@ -60,6 +60,13 @@ pub(super) fn write_directions(
         (0..TILE).for_each(|lane| fibres.write(lane, directions_of(material, tile.element(lane))));
     }
     Ok(())
+}
+
+impl SceneFacts {
+    /// Families of directions that the fibres of the tissues need: none, one or both.
+    pub(crate) const fn families(&self) -> usize {
+        self.families
+    }
 }
 
 impl<'a, M: Material> SceneView<'a, M> {

@@ -2,9 +2,7 @@
 
 use core::ops::Range;
 
-#[cfg(feature = "capi-neo-hookean")]
-use super::SceneFacts;
-use super::{SceneView, fibre_tiles_for};
+use super::{SceneFacts, SceneView, fibre_tiles_for};
 use crate::element::{Series, VECTORS_OF_TERM};
 use crate::material::{Element, Laws, Material, Prony};
 
@@ -27,7 +25,6 @@ pub(super) fn terms_of(material: &impl Material) -> usize {
     material.prony().iter().map(Prony::terms).max().unwrap_or(0)
 }
 
-#[cfg(feature = "capi-neo-hookean")]
 impl SceneFacts {
     /// Terms of the tissue that relaxes with most.
     pub(crate) const fn terms(&self) -> usize {

@@ -65,22 +65,18 @@ impl Wall {
         }
         let points: Vec<_> = points.iter().map(|&point| DVec3::from_array(point)).collect();
         let at = |node: u32| points.get(node as usize).copied().unwrap_or_default();
-        let elements: Vec<_> = tets.iter().map(|tet| (*tet, gradients(tet.map(at)))).collect();
-        // The faces of an element are turned outwards where its volume is positive.
-        let surface = boundary(elements.iter().map(|(tet, (_, volume))| {
-            let &[a, b, c, d] = tet;
-            if *volume < 0.0 { [b, a, c, d] } else { *tet }
-        }));
+        let elements: Vec<_> = tets.iter().map(|tet| Tetrahedron::new(*tet, tet.map(at))).collect();
+        let surface = boundary(elements.iter().map(|element| element.nodes));
         let depths = depths(self.sides(axis, at, &surface, points.len())?, &elements);
         let [inner, outer] = self.helix.map(f64::to_radians);
-        let of_element = |(tet, (slopes, _)): &([u32; 4], ([DVec3; 3], f64))| {
-            let depth = tet.map(|node| depths[node as usize]);
-            let across = (1..4).fold(DVec3::ZERO, |sum, corner| sum + slopes[corner - 1] * (depth[corner] - depth[0]));
-            let middle = tet.map(at).into_iter().sum::<DVec3>() / 4.0 - DVec3::from_array(self.through);
+        let of_element = |element: &Tetrahedron| {
+            let across = element.gradient(&depths);
+            let middle = element.nodes.map(at).into_iter().sum::<DVec3>() / 4.0 - DVec3::from_array(self.through);
             let sheet = across.try_normalize().or_else(|| middle.reject_from_normalized(axis).try_normalize());
             let sheet = sheet.unwrap_or_else(|| axis.any_orthonormal_vector());
             let around = axis.cross(sheet).try_normalize().unwrap_or_else(|| sheet.any_orthonormal_vector());
-            let angle = inner + (outer - inner) * depth.iter().sum::<f64>() / 4.0;
+            let depth = element.nodes.map(|node| depths[node as usize]).iter().sum::<f64>() / 4.0;
+            let angle = inner + (outer - inner) * depth;
             let fibre = around * angle.cos() + sheet.cross(around) * angle.sin();
             Directions { fibre: fibre.as_vec3().to_array(), sheet: sheet.as_vec3().to_array() }
         };
@@ -119,30 +115,53 @@ impl Wall {
     }
 }
 
+/// A linear tetrahedron.
+struct Tetrahedron {
+    /// In the order in which its volume is positive.
+    nodes: [u32; 4],
+    /// Gradients of the shape functions, 1/m.
+    slopes: [DVec3; 4],
+    /// m^3.
+    volume: f64,
+}
+
+impl Tetrahedron {
+    fn new(nodes: [u32; 4], corners: [DVec3; 4]) -> Self {
+        let ([b, c, d], volume) = gradients(corners);
+        let (a, [first, second, third, fourth]) = (-(b + c + d), nodes);
+        if volume < 0.0 {
+            return Self { nodes: [second, first, third, fourth], slopes: [b, a, c, d], volume: -volume };
+        }
+        Self { nodes, slopes: [a, b, c, d], volume }
+    }
+
+    /// The gradient of a function with these values at all nodes.
+    fn gradient(&self, values: &[f64]) -> DVec3 {
+        let of_nodes = self.nodes.iter().zip(self.slopes);
+        of_nodes.fold(DVec3::ZERO, |sum, (node, slope)| sum + slope * values[*node as usize])
+    }
+
+    /// Adds something of each slope to the numbers of the nodes.
+    fn add(&self, of_slope: impl Fn(DVec3) -> f64, numbers: &mut [f64]) {
+        let of_nodes = self.nodes.iter().zip(self.slopes);
+        of_nodes.for_each(|(node, slope)| numbers[*node as usize] += self.volume * of_slope(slope));
+    }
+}
+
 /// Solves Laplace's equation for the nodes that have no value, by conjugate gradients with the diagonal.
-fn depths(given: Vec<Option<f64>>, elements: &[([u32; 4], ([DVec3; 3], f64))]) -> Vec<f64> {
+fn depths(given: Vec<Option<f64>>, elements: &[Tetrahedron]) -> Vec<f64> {
     let product = |vector: &[f64]| {
         let mut result = std::vec![0.0; vector.len()];
-        for (tet, (slopes, volume)) in elements {
-            let all = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
-            let values = tet.map(|node| vector[node as usize]);
-            let gradient = (0..4).fold(DVec3::ZERO, |sum, corner| sum + all[corner] * values[corner]);
-            for (node, slope) in tet.iter().zip(all) {
-                result[*node as usize] += volume.abs() * slope.dot(gradient);
-            }
+        for element in elements {
+            let gradient = element.gradient(vector);
+            element.add(|slope| slope.dot(gradient), &mut result);
         }
-        for (entry, given) in result.iter_mut().zip(&given) {
-            if given.is_some() {
-                *entry = 0.0;
-            }
-        }
+        let known = result.iter_mut().zip(&given).filter(|(_, given)| given.is_some());
+        known.for_each(|(entry, _)| *entry = 0.0);
         result
     };
     let mut diagonal = std::vec![0.0; given.len()];
-    for (tet, (slopes, volume)) in elements {
-        let all = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
-        tet.iter().zip(all).for_each(|(node, slope)| diagonal[*node as usize] += volume.abs() * slope.length_squared());
-    }
+    elements.iter().for_each(|element| element.add(DVec3::length_squared, &mut diagonal));
     let scaled = |residual: &[f64]| -> Vec<f64> {
         residual.iter().zip(&diagonal).map(|(entry, own)| if *own > 0.0 { entry / own } else { 0.0 }).collect()
     };

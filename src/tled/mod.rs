@@ -42,7 +42,7 @@ use crate::element::{self, ElementMaterial, LOOK_CYCLE, NoVisitor, NodeInertia};
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::scene::{AsScene, SceneView};
-use crate::simd::NodeVector;
+use crate::simd::{NodeVector, TILE};
 use crate::state::{AsState, StateView};
 use crate::step::pulls::MOST_WAY;
 use crate::step::{
@@ -137,11 +137,12 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
 #[must_use]
 pub fn element_operations<M: Material>(scene: SceneView<'_, M>) -> u64 {
     let law = scene.material.laws().law();
+    let more = u64::from(element::extension_operations(scene.families(), scene.terms()));
     if scene.element().is_nodal_strain() {
-        return scene.patches.operations(&law);
+        return scene.patches.operations(&law) + more * (TILE * scene.patches.tiles().len()) as u64;
     }
     let nodal = if scene.element().is_nodal_pressure() { element::NODAL_PRESSURE_OPERATIONS } else { 0 };
-    scene.element_count() as u64 * u64::from(element::operations(&law) + nodal)
+    scene.element_count() as u64 * (u64::from(element::operations(&law) + nodal) + more)
 }
 
 /// Floating-point operations of one step without loads, the same for every step.
