@@ -2,11 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::fibres::Fibrous;
+use super::fibres::{Fibrous, PAIRS};
 use crate::material::{FIBRE_TERMS, Fibres, J_FLOOR};
-
-/// The families of each term.
-const PAIRS: [[usize; 2]; FIBRE_TERMS] = [[0, 0], [1, 1], [0, 1]];
 
 /// The stress of fibres at a deformation gradient, and the derivative of it.
 #[derive(Clone, Copy, Debug)]
@@ -54,14 +51,14 @@ impl FibreTangent {
         let curvature = if volume_ratio > floor { 10.0 / 9.0 * g / (sound * sound) } else { 0.0 };
         let factor = [g + slope * (volume_ratio - sound), slope, curvature];
         let images = directions.map(|direction| f * direction);
-        let mut x = PAIRS.map(|[p, q]| factor[0] * images[p].dot(images[q]));
+        let mut x = PAIRS.map(|[p, q]| factor[0] * images[p % 2].dot(images[q % 2]));
         (x[0], x[1]) = (x[0] - 1.0, x[1] - 1.0);
         Self { f, cofactor: cofactor(f), factor, directions, slopes: fibres.slopes(x) }
     }
 
     /// `dy/dF` of a term, with `I` and `g m_p . m_q`.
     fn derivative(&self, term: usize) -> (DMat3, f64) {
-        let [p, q] = PAIRS[term].map(|family| self.directions[family]);
+        let [p, q] = PAIRS[term % FIBRE_TERMS].map(|family| self.directions[family % 2]);
         let [g, slope, _] = self.factor;
         let product = (self.f * p).dot(self.f * q);
         let of_directions = outer(self.f * p, q) + outer(self.f * q, p);
@@ -70,7 +67,8 @@ impl FibreTangent {
 
     /// The first Piola-Kirchhoff stress.
     pub(crate) fn stress(&self) -> DMat3 {
-        (0..FIBRE_TERMS).fold(DMat3::ZERO, |sum, term| sum + self.derivative(term).0 * self.slopes[term][0])
+        (0..FIBRE_TERMS)
+            .fold(DMat3::ZERO, |sum, term| sum + self.derivative(term).0 * self.slopes[term % FIBRE_TERMS][0])
     }
 
     /// `P F^T`, the Kirchhoff stress.
@@ -85,9 +83,9 @@ impl FibreTangent {
         let volume = inner(self.cofactor, df);
         let d_cofactor = (cofactor(self.f + df) - cofactor(self.f - df)) * 0.5;
         let of_term = |term: usize| {
-            let [p, q] = PAIRS[term].map(|family| self.directions[family]);
+            let [p, q] = PAIRS[term % FIBRE_TERMS].map(|family| self.directions[family % 2]);
             let (x, product) = self.derivative(term);
-            let [first, second] = self.slopes[term];
+            let [first, second] = self.slopes[term % FIBRE_TERMS];
             let (mp, mq) = (self.f * p, self.f * q);
             let d_product = (df * p).dot(mq) + mp.dot(df * q);
             let change = (outer(mp, q) + outer(mq, p)) * (slope * volume)

@@ -16,13 +16,13 @@ use super::deformation::{Deformation, Matrix, Vector};
 use super::extension::Distortion;
 use super::tile::vector_at;
 use crate::material::{Directions, FIBRE_TERMS, FibreTerm, Fibres, Invariants, VolumeFactor};
-use crate::simd::{Real, TILE, dot};
+use crate::simd::{Real, TILE, dot, unrolled};
 
 /// Families of directions.
 const FAMILIES: usize = 2;
 
 /// The families of each term.
-const PAIRS: [[usize; 2]; FIBRE_TERMS] = [[0, 0], [1, 1], [0, 1]];
+pub(super) const PAIRS: [[usize; 2]; FIBRE_TERMS] = [[0, 0], [1, 1], [0, 1]];
 
 /// Directions of fibres in a tile of elements, or with nodal strain of patches, at rest: unit vectors, by family and
 /// axis. Of a patch that of the mean of `V f f^T` over its elements that has the largest eigenvalue.
@@ -194,12 +194,12 @@ impl<'a> Fibrous<'a> {
         for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
             *row = self.of(element(lane)).terms();
         }
-        for term in 0..FIBRE_TERMS {
+        unrolled!(term < FIBRE_TERMS => {
             terms[term] = FibreTerm {
                 a: R::from_fn(|lane| rows[lane % TILE][term][0]),
                 b: R::from_fn(|lane| rows[lane % TILE][term][1]),
             };
-        }
+        });
         terms
     }
 
@@ -223,20 +223,22 @@ impl<'a> Fibrous<'a> {
             terms: self.terms(element),
         };
         let mut moved = [none; FAMILIES];
-        for family in 0..self.families.min(FAMILIES) {
-            let direction = tile.direction::<R>(family, first);
-            let change = [dot(h[0], direction), dot(h[1], direction), dot(h[2], direction)];
-            let mut twice = none;
-            for axis in 0..3 {
-                stretch.images[family][axis] = direction[axis] + change[axis];
-                twice[axis] = direction[axis] + stretch.images[family][axis];
+        unrolled!(family < FAMILIES => {
+            if family < self.families {
+                let direction = tile.direction::<R>(family, first);
+                let change = [dot(h[0], direction), dot(h[1], direction), dot(h[2], direction)];
+                let mut twice = none;
+                for axis in 0..3 {
+                    stretch.images[family][axis] = direction[axis] + change[axis];
+                    twice[axis] = direction[axis] + stretch.images[family][axis];
+                }
+                // I - 1 without cancellation, as a unit vector has no other length.
+                let square = dot(twice, change);
+                stretch.products[family] = square + R::splat(1.0);
+                stretch.x[family] = g.fused(square, less_one).max(zero);
+                (stretch.directions[family], moved[family]) = (direction, change);
             }
-            // I - 1 without cancellation, as a unit vector has no other length.
-            let square = dot(twice, change);
-            stretch.products[family] = square + R::splat(1.0);
-            stretch.x[family] = g.fused(square, less_one).max(zero);
-            (stretch.directions[family], moved[family]) = (direction, change);
-        }
+        });
         if self.families == FAMILIES {
             // At right angles at rest.
             let [[f, s], [df, ds]] = [stretch.directions, moved];
@@ -285,10 +287,8 @@ impl<'a> Fibrous<'a> {
         let ddg = R::splat(10.0 / 9.0) * g * (local.inverse * local.inverse);
         let volume_ratio = one + invariants.j;
         let mut bound = R::splat(0.0);
-        for term in 0..FIBRE_TERMS {
-            if term > 0 && self.families < FAMILIES {
-                break;
-            }
+        unrolled!(term < FIBRE_TERMS => {
+            if term == 0 || self.families == FAMILIES {
             let [p, q] = PAIRS[term];
             let [slope, curvature] = stretch.terms[term].slope_and_curvature(stretch.x[term]);
             let product = stretch.products[term];
@@ -304,7 +304,8 @@ impl<'a> Fibrous<'a> {
             let mixed = steep * R::splat(RATIO).fused(squares + squares, cofactor * R::splat(1.0 / RATIO));
             let geometric = two.fused(g, (steep * size).fused(reach, ddg * size * cofactor)) + mixed;
             bound = curvature.fused(square, slope.abs().fused(geometric, bound));
-        }
+            }
+        });
         bound
     }
 
@@ -326,14 +327,16 @@ impl<'a> Fibrous<'a> {
             inner,
             families: self.families,
         };
-        for family in 0..self.families.min(FAMILIES) {
-            let direction = tile.direction::<R>(family, first);
-            for axis in 0..3 {
-                stress.images[family][axis] = direction[axis] + dot(h[axis], direction);
-                stress.across[family][axis] = slopes[family] * direction[axis];
+        unrolled!(family < FAMILIES => {
+            if family < self.families {
+                let direction = tile.direction::<R>(family, first);
+                for axis in 0..3 {
+                    stress.images[family][axis] = direction[axis] + dot(h[axis], direction);
+                    stress.across[family][axis] = slopes[family] * direction[axis];
+                }
+                stress.directions[family] = direction;
             }
-            stress.directions[family] = direction;
-        }
+        });
         if self.families == FAMILIES {
             for axis in 0..3 {
                 let [f, s] = [stress.directions[0][axis], stress.directions[1][axis]];
@@ -401,15 +404,17 @@ impl<R: Real> FibreStress<R> {
     /// Adds `F B` times `g` to a stress, Pa.
     #[inline(always)]
     pub(super) fn add_to(&self, stress: &mut Matrix<R>, g: R) {
-        for family in 0..self.families.min(FAMILIES) {
-            let [x, y, z] = self.across[family];
-            let across = [g * x, g * y, g * z];
-            for i in 0..3 {
-                for j in 0..3 {
-                    stress[i][j] = self.images[family][i].fused(across[j], stress[i][j]);
+        unrolled!(family < FAMILIES => {
+            if family < self.families {
+                let [x, y, z] = self.across[family];
+                let across = [g * x, g * y, g * z];
+                for i in 0..3 {
+                    for j in 0..3 {
+                        stress[i][j] = self.images[family][i].fused(across[j], stress[i][j]);
+                    }
                 }
             }
-        }
+        });
     }
 
     /// `B`, by components xx, yy, zz, xy, yz, zx, Pa.
@@ -460,7 +465,8 @@ impl<R: Real> FibreBounds<R> {
         }
         let length_c = cofactor.max(R::splat(1e-12)).sqrt();
         let volume_ratio = one + deformation.invariants.j;
-        let lengths = [0, 1].map(|family| dot(stretch.images[family], stretch.images[family]).sqrt());
+        let [f, s] = stretch.images;
+        let lengths = [dot(f, f).sqrt(), dot(s, s).sqrt()];
         let mut bounds = Self {
             stretch,
             isotropic: zero,
@@ -471,7 +477,7 @@ impl<R: Real> FibreBounds<R> {
             squares: [zero; FIBRE_TERMS],
             spatial: [zero; 3],
         };
-        for term in 0..FIBRE_TERMS {
+        unrolled!(term < FIBRE_TERMS => {
             let [p, q] = PAIRS[term];
             let [slope, curvature] = stretch.terms[term].slope_and_curvature(stretch.x[term]);
             let (slope, product) = (slope.abs(), stretch.products[term].abs());
@@ -496,20 +502,21 @@ impl<R: Real> FibreBounds<R> {
                 + scale * (four * shape.divide(both.max(R::splat(1e-12))) + R::splat(2.0 / 3.0) * product);
             bounds.spatial[1] = bounds.spatial[1] + R::splat(4.0 / 9.0) * scale * (both - product).max(zero);
             bounds.spatial[2] = bounds.spatial[2] + two * scale * both;
-        }
+        });
         bounds
     }
 
     /// The image `X a` of a shape function gradient `a`, with `C a`.
     #[inline(always)]
     pub(super) fn image(&self, term: usize, gradient: Vector<R>, of_cofactor: Vector<R>) -> Vector<R> {
-        let [p, q] = PAIRS[term % FIBRE_TERMS];
+        let term = term % FIBRE_TERMS;
+        let (p, q) = (PAIRS[term][0] % FAMILIES, PAIRS[term][1] % FAMILIES);
         let Stretch { directions, images, .. } = &self.stretch;
         let [by_q, by_p] = [self.g * dot(directions[q], gradient), self.g * dot(directions[p], gradient)];
         let mut image = of_cofactor;
         for axis in 0..3 {
             let of_directions = images[p][axis].fused(by_q, images[q][axis] * by_p);
-            image[axis] = self.along_c[term % FIBRE_TERMS].fused(of_cofactor[axis], of_directions);
+            image[axis] = self.along_c[term].fused(of_cofactor[axis], of_directions);
         }
         image
     }
