@@ -191,14 +191,19 @@ impl<R: Real> Distortion<R> {
     /// Adds to `A` what fibres add: `B - B:C / (3 J^2) N^T N`.
     #[inline(always)]
     fn add_fibres(&self, driving: &mut [R; COMPONENTS], fibres: &FibreStress<R>, m: &Matrix<R>) {
-        let (one, zero) = (R::splat(1.0), R::splat(0.0));
+        let one = R::splat(1.0);
         let less = fibres.inner * (self.inverse * self.inverse) * R::splat(-1.0 / 3.0);
         let own = fibres.symmetric();
-        let places = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
+        let squares = [
+            square(m, 0, 0) + one,
+            square(m, 1, 1) + one,
+            square(m, 2, 2) + one,
+            square(m, 0, 1),
+            square(m, 1, 2),
+            square(m, 2, 0),
+        ];
         for component in 0..COMPONENTS {
-            let [i, j] = places[component];
-            let square = square(m, i, j) + if i == j { one } else { zero };
-            driving[component] = driving[component] + less.fused(square, own[component]);
+            driving[component] = driving[component] + less.fused(squares[component], own[component]);
         }
     }
 
