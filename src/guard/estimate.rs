@@ -54,8 +54,10 @@ pub(super) struct Envelope {
     least: f32,
     /// Largest mean motion so far, m.
     motion: f32,
-    /// The error may be at least this, m: the motion at the first comparisons, nothing after them.
+    /// The error may be at least this, m: the motion since the start at the first comparisons, nothing after them.
     floor: f32,
+    /// Seconds since the start.
+    elapsed: f32,
     /// None before the first comparison.
     held: Option<Comparison>,
     comparisons: u32,
@@ -78,6 +80,7 @@ impl Envelope {
             least,
             motion: 0.0,
             floor: 0.0,
+            elapsed: 0.0,
             held: None,
             comparisons: 0,
             first: FIRST_COMPARISONS,
@@ -92,6 +95,7 @@ impl Envelope {
         *self = Self {
             motion: 0.0,
             floor: 0.0,
+            elapsed: 0.0,
             held: None,
             comparisons: 0,
             distance: 0.0,
@@ -101,12 +105,14 @@ impl Envelope {
         };
     }
 
-    /// Enters a comparison, so many seconds after the one before.
-    pub(super) fn add(&mut self, found: &Comparison, seconds: f32) {
+    /// Enters a comparison, so many seconds after the one before, where nodes have this mean speed (m/s). The motion that
+    /// is compared is that from the shape at rest, of which a body may have had much at the start.
+    pub(super) fn add(&mut self, found: &Comparison, seconds: f32, speed: f32) {
         let kept = libm::exp2f(-seconds / HALF_LIFE);
         let before = self.held.unwrap_or_default();
         self.motion = self.motion.max(found.motion);
-        self.floor = if self.is_new() { found.motion } else { 0.0 };
+        self.elapsed += seconds;
+        self.floor = if self.is_new() { found.motion.min(speed * self.elapsed) } else { 0.0 };
         self.comparisons = self.comparisons.saturating_add(1);
         let [mean, largest] = [found.mean, found.largest].map(finite);
         self.distance = mean;
@@ -145,7 +151,7 @@ impl Envelope {
     pub(super) fn lose(&mut self, seconds: f32) {
         let before = self.held.unwrap_or_default();
         let mean = before.mean.max(self.motion).max(self.allowed(0.0));
-        self.add(&Comparison { mean, largest: before.largest.max(mean), ..before }, seconds);
+        self.add(&Comparison { mean, largest: before.largest.max(mean), ..before }, seconds, f32::INFINITY);
     }
 
     pub(super) fn estimate(&self) -> Option<Estimate> {
@@ -201,15 +207,25 @@ mod tests {
         let mut envelope = Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]);
         assert_eq!(envelope.estimate(), None);
         for _ in 0..FIRST_COMPARISONS {
-            envelope.add(&distance(0.001), 1e-3);
+            envelope.add(&distance(0.001), 1e-3, f32::INFINITY);
             envelope.wait(5e-4);
             let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
             assert_eq!([mean, largest], [ESTIMATE * 0.05; 2]);
         }
         // It is not held, and does not count as growth.
-        envelope.add(&distance(0.001), 1e-3);
+        envelope.add(&distance(0.001), 1e-3, f32::INFINITY);
         envelope.wait(1e-3);
         assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.001);
+    }
+
+    /// A body that hung already when it was first looked at has moved by what it has done since.
+    #[test]
+    fn at_first_the_error_is_no_more_than_the_motion_since_the_start() {
+        let mut envelope = Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]);
+        envelope.add(&distance(1e-6), 1e-3, 0.02);
+        envelope.wait(0.0);
+        assert!((envelope.estimate().unwrap().mean - ESTIMATE * 2e-5).abs() < 1e-9);
+        assert_eq!(envelope.judge(Status::Ok), Status::Ok);
     }
 
     #[test]
@@ -218,8 +234,8 @@ mod tests {
         for (first, second) in distances.into_iter().flat_map(|first| distances.map(|second| (first, second))) {
             for (seconds, waited) in [(0.0, -1.0), (1e-30, 0.0), (1e-3, 1e-3), (1e30, 1e30)] {
                 for mut envelope in [later(), Envelope::new(&[[0.0; 3], [0.1; 3]])] {
-                    envelope.add(&distance(first), seconds);
-                    envelope.add(&distance(second), seconds);
+                    envelope.add(&distance(first), seconds, f32::INFINITY);
+                    envelope.add(&distance(second), seconds, f32::INFINITY);
                     envelope.wait(waited);
                     let Estimate { mean, largest, allowed, .. } = envelope.estimate().unwrap();
                     let all = [mean, largest, allowed];
@@ -233,11 +249,11 @@ mod tests {
     #[test]
     fn an_envelope_follows_at_once_and_forgets_by_half_in_a_fifth_of_a_second() {
         let mut envelope = later();
-        envelope.add(&distance(0.004), 0.01);
-        envelope.add(&distance(0.0), HALF_LIFE);
+        envelope.add(&distance(0.004), 0.01, f32::INFINITY);
+        envelope.add(&distance(0.0), HALF_LIFE, f32::INFINITY);
         let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
         assert!((mean - ESTIMATE * 0.002).abs() < 1e-8 && (largest - ESTIMATE * 0.004).abs() < 1e-8);
-        envelope.add(&distance(0.006), HALF_LIFE);
+        envelope.add(&distance(0.006), HALF_LIFE, f32::INFINITY);
         assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.006);
     }
 
@@ -245,7 +261,7 @@ mod tests {
     fn a_step_is_inexact_above_a_share_of_the_motion_or_above_the_tolerance() {
         let mut envelope = later();
         assert_eq!(envelope.judge(Status::Ok), Status::Ok);
-        envelope.add(&distance(0.2 * 0.05 / ESTIMATE * 0.99), 0.01);
+        envelope.add(&distance(0.2 * 0.05 / ESTIMATE * 0.99), 0.01, f32::INFINITY);
         assert_eq!(envelope.judge(Status::Ok), Status::Ok);
         envelope.allowed = Allowed::Metres(0.001);
         let Status::Inexact { error, allowed } = envelope.judge(Status::Ok) else { panic!() };
@@ -254,7 +270,7 @@ mod tests {
         let limited = Status::Limited { least_volume_ratio: 0.0, saturation: 0.0, energy_excess: 1.0 };
         assert_eq!(envelope.judge(limited), limited);
         envelope.allowed = Allowed::default();
-        envelope.add(&distance(f32::NAN), 0.01);
+        envelope.add(&distance(f32::NAN), 0.01, f32::INFINITY);
         assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
     }
 
@@ -272,8 +288,8 @@ mod tests {
     #[test]
     fn an_error_above_the_whole_motion_counts_below_a_millimetre() {
         let (mut still, mut moved) = (later(), later());
-        still.add(&Comparison { motion: 1e-4, ..distance(1e-4) }, 1e-3);
-        moved.add(&Comparison { motion: 3e-4, ..distance(1e-4) }, 1e-3);
+        still.add(&Comparison { motion: 1e-4, ..distance(1e-4) }, 1e-3, f32::INFINITY);
+        moved.add(&Comparison { motion: 3e-4, ..distance(1e-4) }, 1e-3, f32::INFINITY);
         assert!(matches!(still.judge(Status::Ok), Status::Inexact { .. }));
         assert_eq!(moved.judge(Status::Ok), Status::Ok);
     }
@@ -282,7 +298,7 @@ mod tests {
     #[test]
     fn a_distance_as_large_as_there_are_numbers_is_inexact() {
         let mut envelope = later();
-        envelope.add(&Comparison { motion: f32::MAX, ..distance(f32::MAX / 2.0) }, 1e-3);
+        envelope.add(&Comparison { motion: f32::MAX, ..distance(f32::MAX / 2.0) }, 1e-3, f32::INFINITY);
         envelope.wait(1e-3);
         let Estimate { mean, largest, allowed, .. } = envelope.estimate().unwrap();
         assert!(mean == f32::MAX && largest == f32::MAX && allowed < mean);
@@ -292,7 +308,7 @@ mod tests {
     #[test]
     fn where_nothing_can_be_compared_the_error_may_be_the_whole_motion() {
         let mut envelope = later();
-        envelope.add(&distance(0.001), 0.01);
+        envelope.add(&distance(0.001), 0.01, f32::INFINITY);
         envelope.lose(0.01);
         assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.05);
     }

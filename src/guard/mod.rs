@@ -325,7 +325,8 @@ impl GuardView<'_> {
             // Else the rounding of each step would part them in a long session.
             second.progress.time = state.time();
             large.is_at(second.progress);
-            envelope.add(&compare(nodes, state.displacement, second.displacement), gone);
+            let speed = if envelope.is_new() { mean_speed(&state) } else { 0.0 };
+            envelope.add(&compare(nodes, state.displacement, second.displacement), gone, speed);
             let more = if envelope.is_new() { 0.0 } else { state.last_step() };
             // Whole steps of the first run: the second run's are then of one length.
             let grown = gone + more;
@@ -390,6 +391,16 @@ fn split<'a, M: Material>(
     let (memory, rest) = rest.split_at_mut_checked(scene.memory_vectors())?;
     let state = StateView::new(displacement, remainder, increment, force, volume, progress);
     Some((state.remembering(memory), rest))
+}
+
+/// Of the nodes, m/s.
+fn mean_speed(state: &StateView<'_>) -> f32 {
+    let lengths = state.increment.iter().map(|increment| {
+        let [x, y, z] = increment.to_array();
+        f64::from(libm::sqrtf(x * x + y * y + z * z))
+    });
+    let nodes = state.increment.len().max(1) as f64;
+    (lengths.sum::<f64>() / nodes) as f32 / state.last_step()
 }
 
 /// Makes the second run start from the state of the first.

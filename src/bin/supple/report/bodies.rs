@@ -1,13 +1,15 @@
 //! Surfaces of bodies as meshes that turn under the mouse: positions in mm, colours by a length at each node, in mm.
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::plots::{Plot, short};
+use super::plots::{Motion, Plot, short};
 
 /// Diagonal of a body in Plotly's units of length.
 const FILL: f64 = 2.4;
 /// Of what does not deform.
-const INSTRUMENT: &str = "#b8bec4";
+pub(super) const INSTRUMENT: &str = "#b8bec4";
 /// Of nodes that an instrument grips.
 const POINTS: &str = "#e0202a";
 
@@ -19,6 +21,16 @@ pub struct Bodies {
     traces: Vec<Value>,
     /// Corners of the box around all of them, m.
     corners: Option<[[f64; 3]; 2]>,
+    motion: Option<Motion>,
+}
+
+/// How a body in motion looks.
+#[derive(Clone, Copy)]
+pub enum Colour<'a> {
+    /// By how far it has moved, up to so many m.
+    Moved { most: f64 },
+    /// The same everywhere.
+    Plain(&'a str),
 }
 
 /// Where to look from: the direction that is up, and the side that the eye is on.
@@ -72,6 +84,38 @@ impl Bodies {
         self.traces.push(trace);
     }
 
+    /// Adds a body in motion: its positions (m) at some times (s), coloured by how far it has moved since the first, up to
+    /// `most` (m), or as it is told. What is around others is seen through.
+    pub fn add_moving(&mut self, times: &[f64], positions: &[Vec<[f64; 3]>], triangles: &[[u32; 3]], colour: Colour) {
+        let (Some(first), Some(last)) = (positions.first(), positions.last()) else { return };
+        let surface = surface(last.len(), triangles);
+        let looks = match colour {
+            Colour::Moved { most } => {
+                let moved = surface.0.iter().map(|&node| {
+                    1e3 * (0..3).map(|axis| (last[node][axis] - first[node][axis]).powi(2)).sum::<f64>().sqrt()
+                });
+                json!({
+                    "intensity": moved.collect::<Vec<_>>(),
+                    "colorscale": "Viridis",
+                    "cmin": 0.0,
+                    "cmax": 1e3 * most,
+                    "showscale": false,
+                    "opacity": 0.45,
+                    "hoverinfo": "skip",
+                })
+            }
+            Colour::Plain(colour) => json!({ "color": colour, "hoverinfo": "skip" }),
+        };
+        let motion = self.motion.get_or_insert_with(|| Motion { times: times.to_vec(), points: vec![] });
+        let at = |positions: &Vec<[f64; 3]>| {
+            let numbers = surface.0.iter().flat_map(|&node| positions[node]);
+            let bytes = numbers.flat_map(|metres| ((1e5 * metres).round() as i16).to_le_bytes());
+            STANDARD.encode(bytes.collect::<Vec<_>>())
+        };
+        motion.points.push((self.traces.len(), positions.iter().map(at).collect()));
+        self.add_surface(last, &surface, looks);
+    }
+
     /// Adds the places of a surface to a trace that says already what it looks like.
     fn add_surface(&mut self, positions: &[[f64; 3]], (numbers, triangles): &Surface, mut trace: Value) {
         trace["type"] = "mesh3d".into();
@@ -112,7 +156,7 @@ impl Bodies {
             "yaxis": hidden,
             "zaxis": hidden,
         });
-        Plot { data: self.traces, layout: json!({ "scene": scene, "showlegend": false }) }
+        Plot { data: self.traces, layout: json!({ "scene": scene, "showlegend": false }), motion: self.motion }
     }
 }
 

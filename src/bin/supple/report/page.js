@@ -126,6 +126,56 @@ function grid(parent, panels) {
     parent.addEventListener("pointerenter", () => siblings.forEach(attend));
 }
 
+/** Places of points in mm, by axis. */
+function places(base64) {
+    const numbers = new Int16Array(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer);
+    return [0, 1, 2].map((axis) => Float32Array.from({ length: numbers.length / 3 }, (_, point) => numbers[3 * point + axis] / 100));
+}
+
+/** Moves a body to a frame; colours that stand for its way are those of the frame. */
+async function show(plot, frame) {
+    const { data, motion } = plot.panel().plot;
+    const change = { x: [], y: [], z: [], intensity: [] };
+    for (const [trace, frames] of motion.points) {
+        const [x, y, z] = places(frames[frame]);
+        change.x.push(x); change.y.push(y); change.z.push(z);
+        const [a, b, c] = places(frames[0]);
+        change.intensity.push(data[trace].intensity ? x.map((_, i) => Math.hypot(x[i] - a[i], y[i] - b[i], z[i] - c[i])) : undefined);
+    }
+    await Plotly.restyle(plot, change, motion.points.map(([trace]) => trace));
+}
+
+/** A button and a slider for bodies in motion; all of a figure move together. */
+function player(after, plots, times) {
+    const bar = document.createElement("div");
+    bar.className = "player";
+    after.after(bar);
+    const button = element(bar, "button", { textContent: "Play", type: "button" });
+    const slider = element(bar, "input", { type: "range", min: 0, max: times.length - 1, value: times.length - 1, ariaLabel: "time" });
+    const label = element(bar, "output");
+    let playing = false;
+    const go = async (frame) => {
+        slider.value = frame;
+        label.textContent = `${times[frame].toFixed(2)} s`;
+        await Promise.all(plots.filter((plot) => shown.has(plot)).map((plot) => show(plot, frame)));
+    };
+    label.textContent = `${times[times.length - 1].toFixed(2)} s`;
+    slider.addEventListener("input", () => { playing = false; button.textContent = "Play"; work = work.then(() => go(+slider.value)); });
+    button.addEventListener("click", async () => {
+        playing = !playing;
+        button.textContent = playing ? "Pause" : "Play";
+        let frame = +slider.value === times.length - 1 ? 0 : +slider.value;
+        while (playing && frame < times.length) {
+            const begin = performance.now();
+            await go(frame);
+            frame += 1;
+            await new Promise((next) => setTimeout(next, Math.max(0, 40 - (performance.now() - begin))));
+        }
+        playing = false;
+        button.textContent = "Play";
+    });
+}
+
 for (const source of document.querySelectorAll("figure > script")) {
     const { panels, columns, scale } = JSON.parse(source.textContent);
     const parent = document.createElement("div");
@@ -138,6 +188,8 @@ for (const source of document.querySelectorAll("figure > script")) {
         parent.after(bar);
     }
     (columns ? grid : choice)(parent, panels);
+    const motion = panels[0]?.plot.motion;
+    if (motion) player(parent, [...parent.querySelectorAll(".plot")], motion.times);
 }
 
 for (const time of document.querySelectorAll("time")) {

@@ -9,6 +9,18 @@ use serde_json::{Value, json};
 pub struct Plot {
     pub data: Vec<Value>,
     pub layout: Value,
+    /// Bodies in motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
+}
+
+/// Where the points of some traces are at each time.
+#[derive(Deserialize, Serialize)]
+pub struct Motion {
+    /// s.
+    pub times: Vec<f64>,
+    /// The trace, and for each time its points: x, y, z in hundredths of a millimetre, as whole numbers of 16 bits in base64.
+    pub points: Vec<(usize, Vec<String>)>,
 }
 
 /// plotly.js's names of lines.
@@ -141,7 +153,7 @@ pub fn short(value: f64) -> String {
 
 fn plot(x: Value, y: Value, curves: Vec<Curve>) -> Plot {
     let layout = json!({ "xaxis": x, "yaxis": y, "hovermode": "closest" });
-    Plot { data: curves.into_iter().map(Curve::trace).collect(), layout }
+    Plot { data: curves.into_iter().map(Curve::trace).collect(), layout, motion: None }
 }
 
 fn axis(title: &str) -> Value {

@@ -1,9 +1,10 @@
 //! What one simulation tells: its table, the body at rest and at the end, motion and estimated error over time, forces
 //! on instruments.
 
+use supple::mesh::boundary;
 use supple::state::VecState;
 
-use super::bodies::{Bodies, View, lengths, moved};
+use super::bodies::{Bodies, Colour, INSTRUMENT, View, lengths, moved};
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, DashType, GREY, Plot};
 use super::{Figure, Panel, ReportPart, Section, Table};
@@ -49,6 +50,29 @@ pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64
     if !setup.instruments.is_empty() {
         let (points, triangles) = instrument_mesh::of(&setup.instruments, &setup.body, time);
         bodies.add_rigid(&points, &triangles);
+    }
+    bodies.plot(View::Standing)
+}
+
+/// Colours of the tissues inside, from the second on.
+const INSIDE: [&str; 3] = ["#e0202a", "#2f6fd0", "#d09a2f"];
+
+/// A body in motion, its shapes at times (s), with the tissues in it and its instruments.
+pub(crate) fn moving(setup: &Setup, shapes: &[Vec<[f32; 3]>], times: &[f64], most: f64) -> Plot {
+    let mut bodies = Bodies::default();
+    let positions: Vec<_> = shapes.iter().map(|shape| moved(&setup.body.mesh.points, shape)).collect();
+    for (tissue, colour) in (1..).zip(INSIDE) {
+        let of_tissue = setup.tissues.elements_of(tissue).map(|element| setup.body.mesh.tets[element]);
+        let surface = boundary(of_tissue);
+        if !surface.is_empty() {
+            bodies.add_moving(times, &positions, &surface, Colour::Plain(colour));
+        }
+    }
+    bodies.add_moving(times, &positions, &setup.body.boundary(), Colour::Moved { most });
+    if !setup.instruments.is_empty() {
+        let of = |time: &f64| instrument_mesh::of(&setup.instruments, &setup.body, *time);
+        let places: Vec<_> = times.iter().map(|time| of(time).0).collect();
+        bodies.add_moving(times, &places, &of(&0.0).1, Colour::Plain(INSTRUMENT));
     }
     bodies.plot(View::Standing)
 }

@@ -39,6 +39,12 @@ impl Tissues {
         Self { tissues: vec![tissue], prony, fibres, directions: vec![], of_element: vec![] }
     }
 
+    /// Of each element the one with this index.
+    pub(crate) fn several(tissues: Vec<Tissue<AnyLaw>>, of_element: Vec<u16>) -> Self {
+        let (prony, fibres) = (vec![Prony::NONE; tissues.len()], vec![Fibres::NONE; tissues.len()]);
+        Self { tissues, prony, fibres, directions: vec![], of_element }
+    }
+
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
         let material = Table::new(file, &file.scene.material, &KEYS)?;
         let law = read_law(file, &material.required("law")?)?;
@@ -75,6 +81,11 @@ impl Tissues {
             None => vec![],
         };
         Ok(Self { tissues, prony, fibres, directions, of_element })
+    }
+
+    /// The elements of the tissue with this index.
+    pub(crate) fn elements_of(&self, tissue: u16) -> impl Iterator<Item = usize> {
+        self.of_element.iter().enumerate().filter(move |(_, of)| **of == tissue).map(|(element, _)| element)
     }
 
     /// The tissue, if there is only one.
