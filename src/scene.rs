@@ -507,12 +507,14 @@ impl<'a, M: Material> SceneView<'a, M> {
     pub fn element_fields(self, displacement: &'a [NodeVector]) -> impl Iterator<Item = ElementFields> + use<'a, M> {
         let laws = self.material.laws();
         let of_fibres = move |element: usize, h: DMat3| {
-            let families = self.facts.families;
             let tissue = usize::from(self.material.region(element));
             let fibres = self.material.fibres().get(tissue).copied().unwrap_or_default();
+            if !fibres.are_there() {
+                return DMat3::ZERO;
+            }
             let directions = directions_of(self.material, element);
             // Not known where a host has given them and keeps none.
-            let known = families == 0 || !fibres.are_there() || directions != [DVec3::ZERO; 2];
+            let known = directions != [DVec3::ZERO; 2];
             if known { FibreTangent::new(&fibres, directions, h).kirchhoff_stress() } else { DMat3::NAN }
         };
         self.places().map(move |(tile, lane)| {

@@ -149,12 +149,23 @@ fn tiles(list: &[u32]) -> impl Iterator<Item = usize> {
     list.iter().take_while(|tile| **tile != NO_TILE).map(|tile| *tile as usize)
 }
 
-/// `sum_a d_a g_a^T` over the nodes of a piece (1).
+/// Motions that differ by less than this share are alike.
+const ALIKE: f32 = 1e-4;
+
+/// `sum_a d_a g_a^T` over the nodes of a piece (1), from differences to the first node: nothing where all move alike but
+/// for rounding, as deep in a part of the body that is moved.
 fn motion_of(piece: &Piece<'_>, motion: impl Fn(usize) -> [f32; 3]) -> [[f32; 3]; 3] {
     let mut gradient = [[0.0; 3]; 3];
-    for (node, of_node) in piece.nodes().into_iter().zip(piece.gradients()) {
-        for (row, motion) in gradient.iter_mut().zip(motion(node)) {
-            row.iter_mut().zip(of_node).for_each(|(sum, along)| *sum += motion * along);
+    let all = piece.nodes().map(motion);
+    let [first, ..] = all;
+    let most = first.iter().fold(0.0_f32, |most, along| most.max(along.abs()));
+    let is_alike = |motion: &[f32; 3]| (0..3).all(|axis| (motion[axis] - first[axis]).abs() <= ALIKE * most);
+    if all.iter().all(is_alike) {
+        return gradient;
+    }
+    for (motion, of_node) in all.into_iter().zip(piece.gradients()) {
+        for ((row, motion), first) in gradient.iter_mut().zip(motion).zip(first) {
+            row.iter_mut().zip(of_node).for_each(|(sum, along)| *sum += (motion - first) * along);
         }
     }
     gradient
