@@ -27,7 +27,7 @@ async function figure(page, title, selector, name) {
 }
 
 const demo = await open(join(runs, "demo", "report.html"), 1000);
-await figure(demo, "A ball", ".panels", "demo");
+await figure(demo, "A liver", ".panels", "demo");
 const lab = await open(join(runs, "lab", "report.html"), 1100);
 await figure(lab, "Speed", ".panels", "speed");
 await figure(lab, "The paper's bar", ".panels", "bars");

@@ -1,8 +1,8 @@
-//! `supple demo`: exact, long and learned steps side by side, and what they leave.
+//! `supple demo`: exact, long, adaptive and learned steps side by side, and what they leave.
 
 use super::{Desk, names};
 
-/// Figures of a row of the table: seconds, guard, real-time factor, error, standing still.
+/// Figures of a row of the table: length of the step (ms), times real time, distances from the exact steps (mm), estimate.
 fn figures(row: &str) -> Vec<f64> {
     row.split_whitespace().filter_map(|word| word.parse().ok()).collect()
 }
@@ -13,36 +13,36 @@ fn the_demo_compares_steps_and_leaves_a_report_and_frames() {
     let said = desk.supple(&["demo"]);
     println!("{}", said.out);
     assert_eq!(said.code, 0, "{}", said.err);
-    let rows = |name: &str| -> Vec<Vec<f64>> {
-        said.out.lines().filter(|line| line.split_whitespace().next() == Some(name)).map(figures).collect()
+    let row = |name: &str| -> (Vec<f64>, String) {
+        let row = said.out.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap_or_default();
+        (figures(row), row.split_whitespace().last().unwrap_or_default().into())
     };
-    let (exact, long, learned) = (rows("exact"), rows("long"), rows("learned"));
-    // One row for each instrument.
-    assert_eq!([exact.len(), long.len(), learned.len()], [2, 2, 2]);
-    for (exact, long) in exact.iter().zip(&long) {
-        let [length, .., still] = exact[..] else { panic!("{exact:?}") };
-        // The lobe moves, longer steps are near the exact ones, and none is exact.
-        let [longer, _, _, _, error, same] = long[..] else { panic!("{long:?}") };
-        assert!(still > 5.0 && same == still && longer > 8.0 * length, "{exact:?} {long:?}");
-        assert!(error > 0.0 && error < 0.02 * still, "{long:?}");
+    let ((exact, is_ok), (long, is_long_ok), (auto, is_auto_ok)) = (row("exact"), row("long"), row("auto"));
+    assert_eq!([is_ok.as_str(), &is_long_ok, &is_auto_ok], ["ok"; 3]);
+    // Longer steps are near the exact ones, take less time, and their errors are less than the guard's estimates.
+    for other in [long, auto] {
+        let &[length, times, off, at_target, estimate] = other.as_slice() else { panic!("{other:?}") };
+        assert!(length > 10.0 * exact[0] && times > 1.2 * exact[1], "{exact:?} {other:?}");
+        assert!(off > 0.0 && off < 0.2 && at_target < 0.3 && estimate > off, "{other:?}");
     }
-    // The learned step cannot meet the ball and says so; forceps it can follow, in steps far above the critical one.
-    assert!(learned[0].is_empty(), "{learned:?}");
-    let refusal = "learned: refused: stopped at 0.300000 s: the loads have instruments, which this step cannot meet";
-    assert!(said.out.contains(refusal), "{}", said.out);
-    let [length, _, _, _, error, still] = learned[1][..] else { panic!("{learned:?}") };
-    assert!(length == 1.5 && error > 0.0 && error < 0.1 * still, "{learned:?}");
+    assert_eq!(row("learned").1, "refused");
+    assert!(said.out.contains("the loads have instruments, which this step cannot meet"), "{}", said.out);
+    // The first sentence says what was gained, of a liver that moves.
+    let found = said.out.lines().find(|line| line.contains("times real time. The liver moves by ")).unwrap();
+    let moved = found.split_once("moves by ").unwrap().1.split(' ').next().unwrap();
+    let moved: f64 = moved.parse().unwrap();
+    assert!(found.starts_with("exact ") && moved > 8.0, "{found}");
 
     let files = names(&desk.path("out/demo"));
     // Frames, the instruments in each, frames.pvd, final.csv, reactions.csv, summary.json and the report.
     assert_eq!(files.len(), 2 * 35 + 5, "{files:?}");
     let page = std::fs::read_to_string(desk.path("out/demo/report.html")).unwrap();
-    for words in ["A ball presses the dome", "Forceps grip the front edge", "supple demo"] {
+    for words in ["A liver hangs from the diaphragm", "supple demo", "\"motion\":{\"times\":"] {
         assert!(page.contains(words), "{words}");
     }
     let summary = std::fs::read_to_string(desk.path("out/demo/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["status"], "ok");
-    assert!(summary["volume_change_percent"].as_f64().unwrap().abs() < 1.0);
+    assert!(summary["volume_change_percent"].as_f64().unwrap().abs() < 2.0);
     assert!(summary["instruments"][0]["largest_force_n"].as_f64().unwrap() > 0.1);
 }

@@ -53,7 +53,7 @@ const FRICTION: f32 = 0.3;
 const ABOVE: f64 = 0.002;
 const WAY: [(f64, [f64; 3]); 3] = [(0.0, [0.0; 3]), (0.6, [0.0, 0.0, -0.016]), (1.0, [0.006, 0.0, -0.020])];
 /// The long step, over the critical one.
-const TIMES_CRITICAL: f32 = 20.0;
+const TIMES_CRITICAL: f32 = 50.0;
 /// Mean error that adaptive steps may have, m.
 const TOLERANCE: f32 = 0.000_5;
 /// Within this distance of rest the liver hangs before it moves, m.

@@ -58,7 +58,7 @@ pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64
 const INSIDE: [&str; 3] = ["#e0202a", "#2f6fd0", "#d09a2f"];
 
 /// A body in motion, its shapes at times (s), with the tissues in it and its instruments.
-pub(crate) fn moving(setup: &Setup, shapes: &[Vec<[f32; 3]>], times: &[f64], most: f64) -> Plot {
+pub(crate) fn moving(setup: &Setup, shapes: &[&Vec<[f32; 3]>], times: &[f64], most: f64) -> Plot {
     let mut bodies = Bodies::default();
     let positions: Vec<_> = shapes.iter().map(|shape| moved(&setup.body.mesh.points, shape)).collect();
     for (tissue, colour) in (1..).zip(INSIDE) {
