@@ -28,8 +28,8 @@ use crate::simulate::{Job, Out, Simulated, progress_bar};
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
 /// For steps of 1.5 ms, with int8 layers.
 const NETWORK: &[u8] = include_bytes!("../../../weights/compact-50-i8.weights");
-/// Liver-like: shear modulus 1.5 kPa at rest, stiffening like the paper's law, nearly incompressible.
-const TISSUE: Exponential = Exponential { a: 1_500.0, b: 8.023, d: 40_000.0 };
+/// Liver-like: shear modulus 2 kPa at rest, stiffening like the paper's law, nearly incompressible.
+const TISSUE: Exponential = Exponential { a: 2_000.0, b: 8.023, d: 50_000.0 };
 /// How many times as stiff as the liver: the tumour, and the walls of vessels.
 const TUMOUR: f32 = 5.0;
 const VESSELS: f32 = 3.0;
@@ -47,11 +47,12 @@ const TARGET_RADIUS: f64 = 0.009;
 /// Vessels: from, to, and radius, m.
 const TUBES: [([f64; 3], [f64; 3], f64); 2] =
     [([0.000, 0.020, 0.020], [0.090, -0.005, 0.022], 0.004), ([0.040, 0.010, 0.020], [0.060, -0.040, 0.015], 0.003)];
-/// The probe, a ball: radius (m), friction, how high above the dome it begins, and how it goes from there, s and m.
+/// The probe, a ball: radius (m), friction, how high above the dome it begins, which sags, and how it goes from there, s
+/// and m.
 const RADIUS: f32 = 0.012;
 const FRICTION: f32 = 0.3;
 const ABOVE: f64 = 0.002;
-const WAY: [(f64, [f64; 3]); 3] = [(0.0, [0.0; 3]), (0.6, [0.0, 0.0, -0.016]), (1.0, [0.006, 0.0, -0.020])];
+const WAY: [(f64, [f64; 3]); 3] = [(0.0, [0.0; 3]), (0.6, [0.0, 0.0, -0.021]), (1.0, [0.004, 0.0, -0.026])];
 /// The long step, over the critical one.
 const TIMES_CRITICAL: f32 = 50.0;
 /// Mean error that adaptive steps may have, m.

@@ -27,7 +27,7 @@ pub struct Bodies {
 /// How a body in motion looks.
 #[derive(Clone, Copy)]
 pub enum Colour<'a> {
-    /// By how far it has moved, up to so many m.
+    /// By how far it has moved from the mean of its nodes, up to so many m.
     Moved { most: f64 },
     /// The same everywhere.
     Plain(&'a str),
@@ -84,23 +84,22 @@ impl Bodies {
         self.traces.push(trace);
     }
 
-    /// Adds a body in motion: its positions (m) at some times (s), coloured by how far it has moved since the first, up to
-    /// `most` (m), or as it is told. What is around others is seen through.
+    /// Adds a body in motion: its positions (m) at some times (s), coloured by how far its nodes have moved since the first
+    /// more or less than their mean, up to `most` (m), or as it is told. What is around others is seen through.
     pub fn add_moving(&mut self, times: &[f64], positions: &[Vec<[f64; 3]>], triangles: &[[u32; 3]], colour: Colour) {
         let (Some(first), Some(last)) = (positions.first(), positions.last()) else { return };
         let surface = surface(last.len(), triangles);
         let looks = match colour {
             Colour::Moved { most } => {
-                let moved = surface.0.iter().map(|&node| {
-                    1e3 * (0..3).map(|axis| (last[node][axis] - first[node][axis]).powi(2)).sum::<f64>().sqrt()
-                });
+                let moved = distances_from_mean(first, last);
+                let moved = surface.0.iter().map(|&node| 1e3 * moved[node]);
                 json!({
                     "intensity": moved.collect::<Vec<_>>(),
                     "colorscale": "Viridis",
                     "cmin": 0.0,
                     "cmax": 1e3 * most,
                     "showscale": false,
-                    "opacity": 0.45,
+                    "opacity": 0.6,
                     "hoverinfo": "skip",
                 })
             }
@@ -114,6 +113,10 @@ impl Bodies {
         };
         motion.points.push((self.traces.len(), positions.iter().map(at).collect()));
         self.add_surface(last, &surface, looks);
+        if let Some(trace) = self.traces.last_mut() {
+            trace["flatshading"] = false.into();
+            trace["lighting"] = json!({ "ambient": 0.5, "diffuse": 0.8, "specular": 0.15, "roughness": 0.6 });
+        }
     }
 
     /// Adds the places of a surface to a trace that says already what it looks like.
@@ -193,6 +196,13 @@ pub fn lengths(vectors: &[[f32; 3]]) -> Vec<f64> {
 pub fn distances(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
     let pairs = a.iter().zip(b);
     lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
+}
+
+/// How far each point has moved from the first to the last place, less what all have in the mean.
+pub fn distances_from_mean(first: &[[f64; 3]], last: &[[f64; 3]]) -> Vec<f64> {
+    let moved = || first.iter().zip(last).map(|(first, last)| [0, 1, 2].map(|axis| last[axis] - first[axis]));
+    let mean = [0, 1, 2].map(|axis| moved().map(|moved| moved[axis]).sum::<f64>() / first.len().max(1) as f64);
+    moved().map(|moved| (0..3).map(|axis| (moved[axis] - mean[axis]).powi(2)).sum::<f64>().sqrt()).collect()
 }
 
 /// The mean of lengths (m), mm.

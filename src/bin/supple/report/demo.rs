@@ -1,7 +1,7 @@
 //! Steps side by side on one body: a table for the screen and the report, shapes at the end, error over time with its
 //! estimate.
 
-use super::bodies::{distances, mean_millimetres};
+use super::bodies::{distances, distances_from_mean, mean_millimetres, moved as at};
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, DashType, GREY, short};
 use super::simulation::{body, moving};
@@ -183,7 +183,11 @@ fn section(compared: &Compared) -> Section {
         .iter()
         .filter_map(|run| Some((run, run.shapes().last()?, run.outcome()?.frames.last()?.time)))
         .collect();
-    let most = exact.last().map_or(0.0, |shape| distances(shape, &exact[0]).into_iter().fold(1e-6, f64::max));
+    let most = exact.last().map_or(0.0, |shape| {
+        let points = &compared.runs[0].setup.body.mesh.points;
+        let moved = distances_from_mean(&at(points, &exact[0]), &at(points, shape));
+        moved.into_iter().fold(1e-6, f64::max)
+    });
     let bodies = ended.iter().map(|(run, ..)| {
         // Every other frame: they are most of the page.
         let frames = run.outcome().map_or(&[][..], |outcome| &outcome.frames).iter().zip(run.shapes()).step_by(2);
@@ -191,11 +195,11 @@ fn section(compared: &Compared) -> Section {
         Panel::new(format!("{} steps", run.name), moving(&run.setup, &shapes, &times, most))
     });
     let bodies = Figure::grid(
-        "The liver, coloured by how far it has moved; in it the tumour (red) and two vessels (blue); grey: the probe. Turn one and all turn.",
+        "The liver, coloured by how far it has moved more or less than in the mean; in it the tumour (red) and two vessels (blue); grey: the probe. Turn one and all turn.",
         bodies.collect(),
         ended.len(),
         1e3 * most,
-        "moved",
+        "from the mean",
     );
     Section {
         title: "A liver hangs from the diaphragm, which breathes in; a probe presses it".into(),

@@ -132,6 +132,13 @@ function places(base64) {
     return [0, 1, 2].map((axis) => Float32Array.from({ length: numbers.length / 3 }, (_, point) => numbers[3 * point + axis] / 100));
 }
 
+/** How far each point has moved, less what all have in the mean. */
+function fromMean(now, first) {
+    const moved = now.map((along, axis) => along.map((at, point) => at - first[axis][point]));
+    const mean = moved.map((along) => along.reduce((sum, one) => sum + one, 0) / along.length);
+    return moved[0].map((_, point) => Math.hypot(...moved.map((along, axis) => along[point] - mean[axis])));
+}
+
 /** Moves a body to a frame; colours that stand for its way are those of the frame. */
 async function show(plot, frame) {
     const { data, motion } = plot.panel().plot;
@@ -140,7 +147,7 @@ async function show(plot, frame) {
         const [x, y, z] = places(frames[frame]);
         change.x.push(x); change.y.push(y); change.z.push(z);
         const [a, b, c] = places(frames[0]);
-        change.intensity.push(data[trace].intensity ? x.map((_, i) => Math.hypot(x[i] - a[i], y[i] - b[i], z[i] - c[i])) : undefined);
+        change.intensity.push(data[trace].intensity ? fromMean([x, y, z], [a, b, c]) : undefined);
     }
     await Plotly.restyle(plot, change, motion.points.map(([trace]) => trace));
 }
