@@ -38,10 +38,10 @@ if [ -n "$target" ]; then
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=$root/usr/bin/aarch64-linux-gnu-gcc
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C link-arg=--sysroot=$root"
     export CARGO_TARGET_DIR=$PWD/target/cross/build
-    "$folder/build/bin/python" -m build --wheel --outdir "$folder" src/python >/dev/null
+    "$folder/build/bin/python" -m build --wheel --outdir "$folder" src/python >"$folder/build.log" || { tail -40 "$folder/build.log" >&2; exit 1; }
     ls -l "$folder"/supple-*-py3-none-manylinux_*_aarch64.whl
     "$folder/build/bin/python" -m zipfile -e "$folder"/supple-*.whl "$folder/unpacked"
-    "$root/usr/bin/aarch64-linux-gnu-gcc" "--sysroot=$root" -std=c11 -O2 -Iinclude examples/bar.c "$folder/unpacked/supple/libsupple.so" -lm \
+    LD_LIBRARY_PATH=$root/usr/lib/x86_64-linux-gnu "$root/usr/bin/aarch64-linux-gnu-gcc" "--sysroot=$root" -std=c11 -O2 -Iinclude examples/bar.c "$folder/unpacked/supple/libsupple.so" -lm \
         -o "$folder/bar"
     "$root/usr/bin/qemu-aarch64-static" -L "$root/usr/aarch64-linux-gnu" "$folder/bar"
     exit
