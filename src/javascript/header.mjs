@@ -16,18 +16,23 @@ export function readHeader(text) {
     if (constants.SUPPLE_ABI === undefined || statuses.SUPPLE_OK !== 0 || structs.supple_scene_config === undefined) {
         throw new Error("include/supple.h has no SUPPLE_ABI, no SUPPLE_OK or no supple_scene_config");
     }
-    return { constants, statuses, structs, none: 0xffffffff };
+    const laws = {};
+    const named = text.split("/* Laws")[1]?.split("/* Sizes")[0] ?? "";
+    for (const [, name, value] of named.matchAll(/^#define SUPPLE_(\w+) (\d+)/gm)) laws[name.toLowerCase().replaceAll("_", "-")] = Number(value);
+    return { constants, statuses, structs, laws, none: 0xffffffff };
 }
 
 /** The same as types of TypeScript. */
 export function typesOf(text) {
-    const { structs } = readHeader(text);
+    const { structs, laws } = readHeader(text);
     const plain = text.replace(/\/\*[\s\S]*?\*\//g, "");
     const value = ({ type, count }) => {
         const one = structs[type] ? type : type === "uint64_t" ? "bigint" : "number";
         return count > 1 ? `${one}[]` : one;
     };
-    const lines = ["// Made by build.mjs from include/supple.h. A pointer is a place in the library's memory.", "export interface Structures {"];
+    const lines = [
+        "// Made by build.mjs from include/supple.h. A pointer is a place in the library's memory.",
+        `export type Law = ${Object.keys(laws).map((law) => JSON.stringify(law)).join(" | ")};`, "export interface Structures {"];
     const shapes = Object.entries(structs).filter(([, struct]) => struct);
     for (const [name] of shapes) lines.push(`    ${name}: ${name};`);
     lines.push("}");

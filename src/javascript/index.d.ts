@@ -1,8 +1,7 @@
 // Types of the package. SI units: m, kg, s, N, Pa.
 
-import type { Functions, Structures, supple_error, supple_estimate } from "./interface.js";
+import type { Functions, Law, Structures, supple_error, supple_estimate } from "./interface.js";
 
-export type { Functions, Structures } from "./interface.js";
 export type * from "./interface.js";
 
 export type Vector = [number, number, number];
@@ -23,7 +22,7 @@ export interface Mesh {
 
 export interface Body {
     /** "neo-hookean" unless it is given. */
-    law?: "neo-hookean" | "exponential" | "polynomial";
+    law?: Law;
     /** Of the law, at most four, in the order of supple.h. */
     constants: number[];
     density: number;
@@ -94,7 +93,7 @@ export declare class Library {
     constructor(module: WebAssembly.Module, header: unknown);
     readonly functions: Functions;
     readonly memory: WebAssembly.Memory;
-    readonly header: { constants: Record<string, number>; statuses: Record<string, number>; none: number };
+    readonly header: { constants: Record<string, number>; statuses: Record<string, number>; laws: Record<Law, number>; none: number };
     /** The place of so many bytes, for as long as the library is there. */
     room(bytes: number): number;
     copy(array: ArrayBufferView): number;

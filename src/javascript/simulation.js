@@ -4,8 +4,6 @@
 import { Refusal } from "./library.js";
 
 export const METHODS = ["exact", "long", "auto"];
-const LAWS = ["neo-hookean", "exponential", "polynomial"];
-const ELEMENTS = ["linear", "nodal-pressure", "nodal-strain"];
 const SETTINGS = { method: "exact", seconds: 0, damping: 0, tolerance: 0.5e-3, guard: true };
 
 export class Simulation {
@@ -39,15 +37,15 @@ export class Simulation {
 
     #build(mesh, { law = "neo-hookean", constants, density, element = "nodal-strain", fixed = [] }, grips) {
         const { library, nodes, places } = this;
-        const number = (name, what, names) => {
-            if (!names.includes(name)) throw new Error(`no ${what} ${name}, only ${names.join(", ")}`);
-            return library.header.constants[`SUPPLE_${name.toUpperCase().replace("-", "_")}`];
-        };
+        const { constants: numbers, laws } = library.header;
+        const elements = { linear: numbers.SUPPLE_LINEAR, "nodal-pressure": numbers.SUPPLE_NODAL_PRESSURE, "nodal-strain": numbers.SUPPLE_NODAL_STRAIN };
+        if (!Object.hasOwn(laws, law)) throw new Error(`no law ${law}, only ${Object.keys(laws).join(", ")}`);
+        if (!Object.hasOwn(elements, element)) throw new Error(`no element ${element}, only ${Object.keys(elements).join(", ")}`);
         const support = library.space("supple_support", fixed.length);
         const { size } = library.layout("supple_support");
         fixed.forEach((node, place) => library.write(support + size * place, "supple_support", { node, axes: 7 }));
         const body = library.write(library.space("supple_scene_config"), "supple_scene_config", {
-            law: number(law, "law", LAWS), winding: library.header.constants.SUPPLE_WINDING_CHECKED, element: number(element, "element", ELEMENTS),
+            law: laws[law], winding: numbers.SUPPLE_WINDING_CHECKED, element: elements[element],
             nodes, elements: mesh.tetrahedra.length / 4, supports: fixed.length, tissues: 1,
             points: this.points, tetrahedra: library.copy(Uint32Array.from(mesh.tetrahedra)), support,
             tissue: library.write(library.space("supple_tissue"), "supple_tissue", {
