@@ -51,6 +51,8 @@ def built_library() -> pathlib.Path:
     if not (RUST / "include" / "supple.h").is_file():
         raise SystemExit(f"supple: the library's sources are not in {RUST}: build from a clone or a source distribution, with pip 21.3 or later")
     if given := os.environ.get("SUPPLE_LIBRARY"):
+        if not pathlib.Path(given).is_file():
+            raise SystemExit(f"supple: SUPPLE_LIBRARY: there is no file {given}")
         return pathlib.Path(given)
     told = cargo("rustc", "--package=supple", "--locked", "--quiet", "--release", "--lib", "--crate-type=cdylib", f"--features={FEATURES}",
                  "--message-format=json-render-diagnostics")
