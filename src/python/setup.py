@@ -112,7 +112,9 @@ class Sources(sdist):
         with tempfile.TemporaryDirectory() as target:
             cargo("package", "--package=supple", "--no-verify", "--allow-dirty", "--quiet", f"--target-dir={target}")
             with tarfile.open(next(pathlib.Path(target, "package").glob("supple-*.crate"))) as crate:
-                crate.extractall(base_dir, filter="data")
+                # Debian 12's Python has no filters yet.
+                crate.extraction_filter = getattr(tarfile, "data_filter", None)
+                crate.extractall(base_dir)
                 pathlib.Path(base_dir, crate.getnames()[0].split("/")[0]).rename(rust)
         with open(rust / "Cargo.toml", "a") as manifest:
             manifest.write("\n[workspace]\n") # of its own, wherever it is unpacked
