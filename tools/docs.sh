@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the commands of the documentation (README.md, docs/, weights/, benches/, meshes/): those of fences marked `sh` as they stand,
+# Runs the commands of the documentation (README.md, CONTRIBUTING.md, docs/, weights/, benches/, meshes/): those of fences marked `sh` as they stand,
 # and of those marked `sh long`, which take minutes, only checks that what they name exists: tests, benchmarks, scripts, files,
 # and the flags of the command. CI runs the long ones elsewhere, or the same with less data.
 #
@@ -70,7 +70,7 @@ awk '/^```rust/ { inside = 1; next } /^```/ { inside = 0 } inside' README.md | w
 done
 
 mkdir -p target out
-for file in README.md docs/*.md weights/*.md benches/README.md meshes/README.md; do
+for file in README.md CONTRIBUTING.md docs/*.md weights/*.md benches/README.md meshes/README.md; do
     fences "$file" "sh long" >target/docs-long
     while read -r line; do
         [ -z "$line" ] || exists "$file" "$line"

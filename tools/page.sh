@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# Builds the web page of examples/page, the kernel in WebAssembly with SIMD in it, as one file that any static server hands out and that
-# opens without one as well; then tests it in node and in headless Chromium.
+# Builds the kernel in WebAssembly with SIMD, of it the npm package of src/javascript, and the web page of examples/page, which has it in
+# one file that any static server hands out and that opens without one as well; then tests package and page in node, and the page in
+# headless Chromium.
 #
-#     tools/page.sh [--build]
+#     tools/page.sh [--build | --package]
 #
-# The page is out/page/index.html; screenshots and figures of the tests come next to it. --build only builds. What it needs comes from
-# Debian (node, chromium), from npm (pinned in examples/page/package-lock.json) and, for the compiler, from `tools/cross.sh --install`.
+# The page is out/page/index.html; screenshots and figures of the tests come next to it. The package is out/npm/supple-kernel-VERSION.tgz.
+# --build only builds, --package builds and tests the package alone. What it needs comes from Debian (node, chromium), from npm (pinned
+# in package-lock.json of both folders) and, for the compiler, from `tools/cross.sh --install`.
 # Building takes two minutes, nearly all for the kernel, the tests take three and a half; for the comparison with the native kernel they
 # need the command, which is built as well.
 set -euo pipefail
@@ -13,12 +15,11 @@ cd "$(dirname "$0")/.."
 
 missing=()
 command -v npm >/dev/null || missing+=(nodejs npm)
-command -v chromium >/dev/null || [ "${1:-}" = --build ] || missing+=(chromium fonts-dejavu-core)
+command -v chromium >/dev/null || [ $# -gt 0 ] || missing+=(chromium fonts-dejavu-core)
 if [ ${#missing[@]} -gt 0 ]; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
 tools/cross.sh --install
-npm ci --prefix examples/page --no-audit --no-fund --silent
 
 # The whole C library, as tools/install.sh builds it, but for a page.
 CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 \
@@ -27,6 +28,19 @@ CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 \
     target/cross/cargo rustc -p supple --quiet --release --target-dir target/page --target wasm32-unknown-unknown -Zbuild-std=core \
     --lib --crate-type cdylib --features capi,panic-handler
 library=target/page/wasm32-unknown-unknown/release/supple.wasm
+
+rm -rf out/npm
+node src/javascript/build.mjs "$library" out/npm/package
+(cd out/npm && npm pack --silent ./package)
+package=$(ls "$PWD"/out/npm/supple-kernel-*.tgz)
+printf '%s  %s bytes\n' "$package" "$(stat -c %s "$package")"
+if [ "${1:-}" != --build ]; then
+    npm ci --prefix src/javascript --no-audit --no-fund --silent
+    SUPPLE_PACKAGE=$package node --test --test-reporter=spec tests/page/package.test.mjs
+fi
+[ "${1:-}" != --package ] || exit 0
+
+npm ci --prefix examples/page --no-audit --no-fund --silent
 mkdir -p out/page
 node examples/page/build.mjs "$library" out/page/index.html
 printf 'out/page/index.html  %s bytes\n%s  %s bytes, %s compressed\n' "$(stat -c %s out/page/index.html)" \

@@ -9,8 +9,8 @@ import { gzipSync } from "node:zlib";
 
 import { build } from "esbuild";
 
-import { readHeader } from "./header.mjs";
-import { readMesh } from "./mesh.mjs";
+import { readHeader } from "../../src/javascript/header.mjs";
+import { readMesh } from "../../src/javascript/mesh.js";
 
 const [wasm, out] = process.argv.slice(2);
 if (!out) throw new Error("node build.mjs LIBRARY.wasm OUT.html");

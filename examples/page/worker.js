@@ -5,7 +5,7 @@ import header from "built:header.json";
 import mesh from "built:lobe.json";
 import compressed from "built:supple.wasm.gz";
 
-import { Library } from "./library.js";
+import { Library } from "../../src/javascript/library.js";
 import { Simulation } from "./simulation.js";
 
 let simulation;

@@ -105,11 +105,11 @@ impl Gmsh {
                 }
                 (other, _) if other.starts_with(b"$") => skip_section(cursor, other)?,
                 (other, None) => {
-                    let reason = format_args!("{} where $MeshFormat or $NOD is expected", quoted(other));
+                    let reason = format!("{} where $MeshFormat or $NOD is expected", quoted(other));
                     return Err(cursor.fault(reason));
                 }
                 (other, _) => {
-                    let reason = format_args!("{} where a section such as $Nodes is expected", quoted(other));
+                    let reason = format!("{} where a section such as $Nodes is expected", quoted(other));
                     return Err(cursor.fault(reason));
                 }
             }

@@ -73,8 +73,7 @@ impl<'a> Legacy<'a> {
                 b"DATASET" => {
                     let kind = self.cursor.word("the kind of data set")?;
                     if !kind.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
-                        let reason =
-                            format_args!("the data set is {}; only UNSTRUCTURED_GRID can be read", quoted(kind));
+                        let reason = format!("the data set is {}; only UNSTRUCTURED_GRID can be read", quoted(kind));
                         return Err(self.cursor.fault(reason));
                     }
                 }

@@ -1,7 +1,6 @@
-"""Writes supple/_interface.py, what cffi needs of include/supple.h, and supple/_laws.py, its laws with their constants: run by
-tools/wheel.sh before the wheel is built.
+"""Writes _interface.py, what cffi needs of include/supple.h, and _laws.py, its laws with their constants: run by setup.py.
 
-    python build_interface.py HEADER
+    python build_interface.py HEADER FOLDER
 
 The header is the only place where structures, functions and numbers are declared.
 """
@@ -42,7 +41,7 @@ def laws(header: str) -> str:
 
 def main() -> None:
     header = pathlib.Path(sys.argv[1]).read_text()
-    folder = pathlib.Path(__file__).parent / "supple"
+    folder = pathlib.Path(sys.argv[2])
     builder = cffi.FFI()
     builder.cdef(declarations(header))
     builder.set_source("supple._interface", None)

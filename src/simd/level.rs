@@ -195,7 +195,7 @@ const AVX512_FEATURES: [u32; 2] = [AVX2_FEATURES[0] | 1 << 16 | 1 << 17 | 1 << 3
 /// system saves the given registers.
 #[cfg(target_arch = "x86_64")]
 fn has(state: u64, [ebx, ecx]: [u32; 2]) -> bool {
-    use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
+    use core::arch::x86_64::{__cpuid_count, _xgetbv, CpuidResult};
 
     const FMA_OSXSAVE_AVX: u32 = 1 << 12 | 1 << 27 | 1 << 28;
     #[target_feature(enable = "xsave")]
@@ -206,13 +206,20 @@ fn has(state: u64, [ebx, ecx]: [u32; 2]) -> bool {
             _xgetbv(0)
         }
     }
+    fn cpuid(leaf: u32) -> CpuidResult {
+        // SAFETY: every processor of x86-64 has it. Newer compilers know.
+        #[allow(unsafe_code, unused_unsafe)]
+        unsafe {
+            __cpuid_count(leaf, 0)
+        }
+    }
     // Miri has no cpuid.
-    if cfg!(miri) || __cpuid(0).eax < 7 || __cpuid(1).ecx & FMA_OSXSAVE_AVX != FMA_OSXSAVE_AVX {
+    if cfg!(miri) || cpuid(0).eax < 7 || cpuid(1).ecx & FMA_OSXSAVE_AVX != FMA_OSXSAVE_AVX {
         return false;
     }
     // SAFETY: OSXSAVE is set, so xgetbv is there.
     #[allow(unsafe_code)]
     let saved = unsafe { enabled_state() };
-    let features = __cpuid_count(7, 0);
+    let features = cpuid(7);
     saved & state == state && features.ebx & ebx == ebx && features.ecx & ecx == ecx
 }

@@ -9,9 +9,9 @@ import { join } from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 
-import { readHeader } from "../../examples/page/header.mjs";
-import { Library } from "../../examples/page/library.js";
-import { readMesh } from "../../examples/page/mesh.mjs";
+import { readHeader } from "../../src/javascript/header.mjs";
+import { Library } from "../../src/javascript/library.js";
+import { readMesh } from "../../src/javascript/mesh.js";
 import { METHODS, Simulation } from "../../examples/page/simulation.js";
 
 const root = fileURLToPath(new URL("../..", import.meta.url));

@@ -25,9 +25,9 @@ use crate::scene::tissues::Tissues;
 use crate::screen::{output, print};
 use crate::simulate::{Job, Out, Simulated, progress_bar};
 
-const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
+const LOBE: &[u8] = include_bytes!("data/lobe.msh");
 /// For steps of 1.5 ms, with int8 layers.
-const NETWORK: &[u8] = include_bytes!("../../../weights/compact-50-i8.weights");
+const NETWORK: &[u8] = include_bytes!("data/compact-50-i8.weights");
 /// Liver-like: shear modulus 2 kPa at rest, stiffening like the paper's law, nearly incompressible.
 const TISSUE: Exponential = Exponential { a: 2_000.0, b: 8.023, d: 50_000.0 };
 /// How many times as stiff as the liver: the tumour, and the walls of vessels.

@@ -1,4 +1,4 @@
-"""The command `python -m supple`: what needs SimpleITK, which the command `supple` does without."""
+"""The command `python -m supple`: a demonstration, and what needs SimpleITK, which the command `supple` does without."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from .demo import demo
 from .errors import Error, InputError
 from .images import displacement_field, grid_for_warping, read_image, write_image
 from .mesh import Mesh
@@ -42,8 +43,15 @@ def warp(arguments: argparse.Namespace) -> None:
     print(f"{arguments.out}: {field.inside} of {np.prod(grid.size)} points of the field within the tissue, which moved by up to {lengths.max():.2f} mm")
 
 
+def show(arguments: argparse.Namespace) -> None:
+    try:
+        print(demo(arguments.out))
+    except OSError as problem:
+        raise InputError(f"{arguments.out}: cannot be written: {problem.strerror}") from None
+
+
 def parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(prog="python -m supple", description="What needs images; all else is in the command supple.")
+    top = argparse.ArgumentParser(prog="python -m supple", description="A demonstration, and what needs images; all else is in the command supple.")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     asked = commands.add_parser("warp", help="warp an image with the last displacements of a simulation")
     asked.add_argument("run", type=pathlib.Path, metavar="RUN", help="folder that `supple simulate` has written")
@@ -54,6 +62,9 @@ def parser() -> argparse.ArgumentParser:
     asked.add_argument("--reach", type=float, default=0.0, metavar="MM", help="how far from the tissue the field ends; without, it goes on")
     asked.add_argument("--ras", action="store_true", help="the mesh is in RAS axes, and not in those of the image, LPS")
     asked.set_defaults(run_command=warp)
+    shown = commands.add_parser("demo", help="a liver lobe under a ball, in exact and in long steps: a table and a picture")
+    shown.add_argument("--out", type=pathlib.Path, default=pathlib.Path("supple-demo.svg"), help="the picture, as SVG (supple-demo.svg)")
+    shown.set_defaults(run_command=show)
     return top
 
 

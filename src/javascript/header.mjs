@@ -1,5 +1,5 @@
 // The C interface of supple as data, for JavaScript: constants, statuses, and where each field of a structure lies in the memory of
-// WebAssembly, by the rules of C with pointers of 32 bits. Read from include/supple.h when the page is built, so that no offset is
+// WebAssembly, by the rules of C with pointers of 32 bits. Read from include/supple.h when the package is built, so that no offset is
 // written by hand. Offsets and sizes are in bytes.
 
 const SIZES = { uint32_t: 4, int32_t: 4, supple_status: 4, float: 4, size_t: 4, double: 8, uint64_t: 8 };
@@ -16,7 +16,41 @@ export function readHeader(text) {
     if (constants.SUPPLE_ABI === undefined || statuses.SUPPLE_OK !== 0 || structs.supple_scene_config === undefined) {
         throw new Error("include/supple.h has no SUPPLE_ABI, no SUPPLE_OK or no supple_scene_config");
     }
-    return { constants, statuses, structs, none: 0xffffffff };
+    const laws = {};
+    const named = text.split("/* Laws")[1]?.split("/* Sizes")[0] ?? "";
+    for (const [, name, value] of named.matchAll(/^#define SUPPLE_(\w+) (\d+)/gm)) laws[name.toLowerCase().replaceAll("_", "-")] = Number(value);
+    return { constants, statuses, structs, laws, none: 0xffffffff };
+}
+
+/** The same as types of TypeScript. */
+export function typesOf(text) {
+    const { structs, laws } = readHeader(text);
+    const plain = text.replace(/\/\*[\s\S]*?\*\//g, "");
+    const value = ({ type, count }) => {
+        const one = structs[type] ? type : type === "uint64_t" ? "bigint" : "number";
+        return count > 1 ? `${one}[]` : one;
+    };
+    const lines = [
+        "// Made by build.mjs from include/supple.h. A pointer is a place in the library's memory.",
+        `export type Law = ${Object.keys(laws).map((law) => JSON.stringify(law)).join(" | ")};`, "export interface Structures {"];
+    const shapes = Object.entries(structs).filter(([, struct]) => struct);
+    for (const [name] of shapes) lines.push(`    ${name}: ${name};`);
+    lines.push("}");
+    for (const [name, { fields }] of shapes) {
+        lines.push(`export interface ${name} {`);
+        for (const [field, kind] of Object.entries(fields)) lines.push(`    ${field}: ${value(kind)};`);
+        lines.push("}");
+    }
+    lines.push("/** The functions of the C API. */", "export interface Functions {");
+    for (const [, result, name, taken] of plain.matchAll(/^([a-z][\w ]*?[\s*]+)(supple_\w+)\(([^)]*)\);/gm)) {
+        const names = taken.split(",").map((one) => one.trim()).filter((one) => one && one !== "void");
+        const typed = names.map((one) => {
+            const found = /(\w+)(\[\d*\])*$/.exec(one)[1];
+            return `${found}: ${/^uint64_t \w+$/.test(one) ? "bigint" : "number"}`;
+        });
+        lines.push(`    ${name}(${typed.join(", ")}): ${/^void\s*$/.test(result) ? "void" : "number"};`);
+    }
+    return [...lines, "}", ""].join("\n");
 }
 
 /** Fields of a structure in the order of the header: type, offset, and how many there are of it. */

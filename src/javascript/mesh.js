@@ -1,5 +1,4 @@
 // Points, tetrahedra and boundary triangles of a Gmsh 2.2 text file whose nodes are counted 1, 2, 3, ..., as those in meshes/ are. Metres.
-// Read when the page is built.
 
 const TRIANGLE = 2;
 const TETRAHEDRON = 4;

@@ -16,12 +16,12 @@ export class Library {
         this.top = this.functions.__heap_base.value;
         const abi = this.functions.supple_abi();
         if (abi !== header.constants.SUPPLE_ABI) {
-            throw new Error(`the module has version ${abi} of the interface, the page ${header.constants.SUPPLE_ABI}`);
+            throw new Error(`the module has version ${abi} of the interface, the package ${header.constants.SUPPLE_ABI}`);
         }
         this.names = Object.fromEntries(Object.entries(header.statuses).map(([name, value]) => [value, name]));
     }
 
-    /** So many bytes of memory for as long as the page is there. */
+    /** So many bytes of memory for as long as the library is there. */
     room(bytes) {
         const align = this.header.constants.SUPPLE_ALIGN;
         const place = Math.ceil(this.top / align) * align;
@@ -93,7 +93,7 @@ export class Library {
     /** Calls a function that cannot fail here; throws the library's own words if it does. */
     call(name, ...values) {
         const status = this.functions[name](...values);
-        if (status < 0) throw new Refusal(name, this.name(status), this.text(status));
+        if (status < 0) throw new Refusal(this, name, status);
         return status;
     }
 
@@ -117,10 +117,16 @@ export class Library {
     }
 }
 
-/** What the library refused. */
+/** What the library refused, in its own words, with its numbers where it tells them. */
 export class Refusal extends Error {
-    constructor(name, status, text) {
-        super(`${name}: ${text} (${status})`);
-        this.status = status;
+    constructor(library, name, status, { node, value = 0, limit = 0 } = {}) {
+        const where = node === undefined || node === library.header.none ? "" : `, node ${node}`;
+        const numbers = value === 0 && limit === 0 ? "" : ` (${value.toPrecision(3)}, limit ${limit.toPrecision(3)}${where})`;
+        const text = library.text(status) + numbers;
+        super(`${name}: ${text} (${library.name(status)})`);
+        this.name = "Refusal";
+        this.code = status;
+        this.status = library.name(status);
+        this.text = text;
     }
 }
