@@ -117,6 +117,21 @@ test("bodies of a figure turn together under the mouse", async (context) => {
     }
 });
 
+test("bodies in motion follow the slider and the button", async (context) => {
+    const page = await open(context, files.find((file) => /demo/.test(file)) ?? files[0], WIDE, "light");
+    const cells = await plots(page, await page.$(".grid"));
+    for (const cell of cells) await show(cell);
+    const low = () => Promise.all(cells.map((cell) => cell.evaluate((element) => Math.min(...element.data[0].z))));
+    const end = await low();
+    await page.$eval(".player input", (slider) => { slider.value = 0; slider.dispatchEvent(new Event("input")); });
+    await page.waitForFunction(() => document.querySelector(".player output").textContent === "0.00 s", { timeout: 20_000, polling: 50 });
+    await page.waitForFunction((z) => Math.abs(Math.min(...document.querySelector(".grid .plot").data[0].z) - z) > 1, { timeout: 20_000, polling: 50 }, end[0]);
+    await page.click(".player button");
+    await page.waitForFunction(() => document.querySelector(".player button").textContent === "Play", { timeout: 120_000, polling: 100 });
+    const after = await low();
+    for (const [index, z] of after.entries()) assert.ok(Math.abs(z - end[index]) < 0.02, `body ${index}: ${z} mm, ${end[index]} at the end`);
+});
+
 test("a choice shows what it names", async (context) => {
     const page = await open(context, files.find((file) => /lab/.test(file)) ?? files[0], WIDE, "light");
     const select = await page.$("select");

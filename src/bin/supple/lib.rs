@@ -70,7 +70,7 @@ enum Command {
         #[arg(long, value_name = "MM")]
         accuracy: Option<f64>,
     },
-    /// A liver lobe that an instrument moves, by exact, long and learned steps side by side: a table and report.html
+    /// A liver that breathes and is pressed, by exact, long, adaptive and learned steps side by side: a table and report.html
     Demo {
         /// Folder for frames and report; results of an earlier demo are overwritten
         #[arg(long, default_value = "out/demo")]
