@@ -3,7 +3,7 @@
 Hexahedral cells of 27 nodes. Masses are Simpson's weights (a flexcomp gives each node the same). Held nodes are `pin`. integrator="discrete" is the only
 one that is implicit in position. Damping is that of the mass, set after compilation, because the compiler refuses joint damping of flex bodies. The law is
 Saint Venant-Kirchhoff's, the only one of these cells.
-- CG 300: up to 300 iterations of conjugate gradients, which are enough at nu 0.45 but not near 0.5.
+- CG 300: up to 300 iterations of conjugate gradients (MuJoCo does 100 unless told otherwise).
 - direct: one Newton iteration of the constraint solver, a sparse factorisation. It needs a constraint, here that of a weight apart, and islands off.
 """
 

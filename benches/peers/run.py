@@ -64,8 +64,15 @@ def machine():
     return f"{name[1] if name else platform.machine()} with {level}; one thread; shared with other work"
 
 
+def nu(row):
+    """As the setting says it."""
+    said = re.search(r"nu ([0-9.]+)", row["setting"])
+    return said[1] if said else None
+
+
 def rows(found, scene, date):
-    """Rows of the table: errors, and the time over that of supple's cheapest setting that is no less accurate at rest and over the swing."""
+    """Rows of the table: errors, and the time over that of supple's cheapest setting, of the same nu or the scene's, that is no less accurate at rest and
+    over the swing."""
     for row in found:
         if "failed" not in row:
             row["errors"] = errors(SCENES[scene], row["rest"], row["swing"])
@@ -79,7 +86,8 @@ def rows(found, scene, date):
         else:
             line["error_at_rest_percent"], line["error_of_swing_percent"] = (f"{error:.2f}" for error in row["errors"])
             line["processor_s_per_s"] = f"{row['seconds']:.4f}"
-            as_good = [one for one in ours if all(a <= b for a, b in zip(one["errors"], row["errors"]))]
+            same = [one for one in ours if nu(one) in (nu(row), f"{SCENES[scene].poisson:.3g}")]
+            as_good = [one for one in same if all(a <= b for a, b in zip(one["errors"], row["errors"]))]
             if as_good:
                 best = min(as_good, key=lambda one: one["seconds"])
                 line["over_supple"] = f"{row['seconds'] / best['seconds']:.3g}"
@@ -95,12 +103,12 @@ def figure(number):
 
 
 def best(lines):
-    """Without those of supple that swing off by more than 20 %, or than which another of supple is no less accurate and cheaper."""
+    """Without those of supple that swing off by more than 20 %, or than which another of the same nu is no less accurate and cheaper."""
     figures = ["error_at_rest_percent", "error_of_swing_percent", "processor_s_per_s"]
 
     def beaten(line):
         values = [float(line[name]) for name in figures]
-        others = [[float(one[name]) for name in figures] for one in lines if one["engine"] == "supple" and one[figures[0]]]
+        others = [[float(one[name]) for name in figures] for one in lines if one["engine"] == "supple" and one[figures[0]] and nu(one) == nu(line)]
         return any(other != values and all(a <= b for a, b in zip(other, values)) for other in others)
 
     return [line for line in lines if line["engine"] != "supple" or line[figures[0]] and float(line[figures[1]]) < 20 and not beaten(line)]
@@ -174,7 +182,7 @@ def main():
         found = []
         for name in names:
             print(f"scene {scene}: {name}", flush=True)
-            out = TARGET / f"{scene}-{name}.json"
+            out = TARGET / f"{scene}-{name}{'-quick' if quick else ''}.json"
             try:
                 if not (arguments.kept and out.exists()):
                     call(*command(name, program, scene, out), *["--quick"] * quick, env=environment, stdout=subprocess.DEVNULL)

@@ -3,9 +3,9 @@
 c (I1bar - 3) + p (J - 1) - p^2 / (4 d), displacements of one order above the pressure's, implicit midpoint rule in time, Newton's method, and a
 direct solver. By symmetry one half of the box is enough: cells are along, across a half, and up.
 
-The truth (truth.json) of scene A is of hexahedra of order 3 (they come to rest within 0.1 % of each other on 4 x 1 x 2, 6 x 2 x 3 and, of order 4, 8 x 2 x 4 cells), extrapolated
+The truth (truth.json) of scene A is of hexahedra of order 3 (they come to rest within 0.2 % of each other on 4 x 1 x 2 and 6 x 2 x 3 cells), extrapolated
 from steps of 1 and 0.5 ms. That of scene B is of tetrahedra of order 2: the edge of the held side that is pressed together makes them converge in first
-order of the size of the cells, so displacements are extrapolated from two meshes and two steps. FOLDER keeps the runs; they take half an hour of one core.
+order of the size of the cells, so displacements are extrapolated from two meshes and two steps. FOLDER keeps the runs, and takes those that it has.
 """
 
 import json
@@ -31,7 +31,6 @@ class Box:
         self.space = motion * ng.H1(self.mesh, order=order - 1)
         self.now, self.old, self.velocity = (ng.GridFunction(self.space) for _ in range(3))
         u, p = self.space.TrialFunction()
-        v, q = self.space.TestFunction()
         c, d = scene.shear / 2, scene.bulk / 2
         deformation = ng.Id(3) + ng.Grad(u)
         j = ng.Det(deformation)
@@ -170,7 +169,7 @@ def truths(folder):
 
 
 SETTINGS = {
-    "a": [((4, 1, 2), 2, False, 0.004), ((4, 1, 2), 2, False, 0.002), ((8, 2, 4), 2, False, 0.004), ((4, 1, 2), 3, True, 0.002)],
+    "a": [((4, 1, 2), 2, False, 0.004), ((4, 1, 2), 2, False, 0.002), ((8, 2, 4), 2, False, 0.004)],
     "b": [((4, 1, 2), 2, False, 0.02), ((8, 2, 4), 2, False, 0.02)],
 }
 
