@@ -498,6 +498,14 @@ impl<'a, M: Material> SceneView<'a, M> {
         self.material.element()
     }
 
+    /// The tissue of each mesh element; nothing where there is one.
+    fn tissues_of_elements(&self) -> &'a [u16] {
+        match self.material.laws() {
+            Laws::One(_) => &[],
+            Laws::Regions { of_element, .. } => of_element,
+        }
+    }
+
     /// What internal forces are computed from.
     pub(crate) fn elements(&self) -> Elements<'a, M::Law> {
         Elements { laws: self.material.laws(), tiles: self.tiles, partitions: &self.facts.partitions }

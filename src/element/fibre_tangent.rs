@@ -3,6 +3,9 @@
 use glam::{DMat3, DVec3};
 
 use super::fibres::{Fibrous, PAIRS};
+#[cfg(feature = "std")]
+use super::matrix::inner;
+use super::matrix::{cofactor, outer};
 use crate::material::{FIBRE_TERMS, Fibres, J_FLOOR};
 
 /// The stress of fibres at a deformation gradient, and the derivative of it.
@@ -15,20 +18,6 @@ pub(crate) struct FibreTangent {
     directions: [DVec3; 2],
     /// `phi'` and `phi''` of each term.
     slopes: [[f64; 2]; FIBRE_TERMS],
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
-
-#[cfg(feature = "std")]
-fn inner(a: DMat3, b: DMat3) -> f64 {
-    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
-}
-
-/// The cofactor matrix.
-fn cofactor(f: DMat3) -> DMat3 {
-    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }
 
 impl Fibrous<'_> {

@@ -14,6 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::extension::Distortion;
+use super::matrix::outer;
 use super::tile::vector_at;
 use crate::material::{Directions, FIBRE_TERMS, FibreTerm, Fibres, Invariants, VolumeFactor};
 use crate::simd::{Real, TILE, dot, unrolled};
@@ -82,8 +83,7 @@ impl MeanDirections {
 
     pub(crate) fn add(&mut self, directions: [DVec3; FAMILIES], volume: f64) {
         for (sum, direction) in self.0.iter_mut().zip(directions) {
-            *sum +=
-                DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z) * volume;
+            *sum += outer(direction, direction) * volume;
         }
     }
 
@@ -289,21 +289,21 @@ impl<'a> Fibrous<'a> {
         let mut bound = R::splat(0.0);
         unrolled!(term < FIBRE_TERMS => {
             if term == 0 || self.families == FAMILIES {
-            let [p, q] = PAIRS[term];
-            let [slope, curvature] = stretch.terms[term].slope_and_curvature(stretch.x[term]);
-            let product = stretch.products[term];
-            let squares = stretch.products[p] + stretch.products[q];
-            let along_c = dg * product;
-            let same = if p == q { two } else { R::splat(0.0) };
-            // |X|^2.
-            let square = (g * g).fused(
-                same.fused(product, squares),
-                along_c * (two * g * same).fused(volume_ratio, along_c * cofactor),
-            );
-            let size = product.abs();
-            let mixed = steep * R::splat(RATIO).fused(squares + squares, cofactor * R::splat(1.0 / RATIO));
-            let geometric = two.fused(g, (steep * size).fused(reach, ddg * size * cofactor)) + mixed;
-            bound = curvature.fused(square, slope.abs().fused(geometric, bound));
+                let [p, q] = PAIRS[term];
+                let [slope, curvature] = stretch.terms[term].slope_and_curvature(stretch.x[term]);
+                let product = stretch.products[term];
+                let squares = stretch.products[p] + stretch.products[q];
+                let along_c = dg * product;
+                let same = if p == q { two } else { R::splat(0.0) };
+                // |X|^2.
+                let square = (g * g).fused(
+                    same.fused(product, squares),
+                    along_c * (two * g * same).fused(volume_ratio, along_c * cofactor),
+                );
+                let size = product.abs();
+                let mixed = steep * R::splat(RATIO).fused(squares + squares, cofactor * R::splat(1.0 / RATIO));
+                let geometric = two.fused(g, (steep * size).fused(reach, ddg * size * cofactor)) + mixed;
+                bound = curvature.fused(square, slope.abs().fused(geometric, bound));
             }
         });
         bound
@@ -319,7 +319,7 @@ impl<'a> Fibrous<'a> {
         h: &Matrix<R>,
     ) -> FibreStress<R> {
         let none = [R::splat(0.0); 3];
-        let FibreSlopes { slopes, inner, .. } = *scalars;
+        let FibreSlopes { slopes, inner } = *scalars;
         let mut stress = FibreStress {
             directions: [none; FAMILIES],
             images: [none; FAMILIES],

@@ -59,9 +59,9 @@ pub(crate) struct MoreEnergy<'a> {
 }
 
 impl MoreEnergy<'_> {
-    /// The density of the energy of what is at a place of a tile and belongs to a mesh element, J/m^3.
-    fn density<L: Law>(&self, law: &L, place: [usize; 2], element: usize, h: DMat3) -> f64 {
-        let (i, j, _) = invariants(h);
+    /// The density of the energy of what is at a place of a tile and belongs to a mesh element, at a displacement gradient
+    /// with these [`invariants`], J/m^3.
+    fn density<L: Law>(&self, law: &L, place: [usize; 2], element: usize, h: DMat3, [i, j]: [f64; 2]) -> f64 {
         let of_fibres = self.fibres.map_or(0.0, |fibres| fibres.energy_density(place, element, h));
         let of_past = self.remembered.map_or(0.0, |of| of.energy_density(law, place, element, h, self.fibres));
         energy_density(law, i, j) + of_fibres + of_past
@@ -78,9 +78,15 @@ pub(crate) fn element_energy<L: Law>(
 ) -> f64 {
     let [_, lane] = place;
     let h = gradient_of(tile, lane, displacements(displacement));
-    let (_, j, _) = invariants(h);
+    let (i, j, _) = invariants(h);
     let of_nodes = volumes.map_or(0.0, |volumes| volume_energy_difference(law, tile, lane, j, volumes));
-    more.density(law, place, tile.element(lane), h) * f64::from(tile.volume::<f32>(lane)) + of_nodes
+    more.density(law, place, tile.element(lane), h, [i, j]) * f64::from(tile.volume::<f32>(lane)) + of_nodes
+}
+
+/// Volume over volume at rest of the element at place `lane` of a tile, under the given displacements (m).
+#[cfg(feature = "std")]
+pub(crate) fn volume_ratio(tile: &ElementTile, lane: usize, displacement: &[NodeVector]) -> f64 {
+    1.0 + invariants(gradient_of(tile, lane, displacements(displacement))).1
 }
 
 /// Fields of the element at place `lane` of a tile, under the given displacements (m), and with a stress `F B F^T` (Pa)
@@ -157,9 +163,9 @@ pub(crate) fn patch_energy<L: Law>(
 ) -> f64 {
     let [_, lane] = place;
     let h = tile.gradient(patches.neighbours_of(tile), lane, displacements(displacement));
-    let (_, _, square) = invariants(h);
+    let (i, j, square) = invariants(h);
     let modulus = stabilising_modulus(law) * stays(more.remembered, tile.element(lane));
-    tile.volume(lane) * (more.density(law, place, tile.element(lane), h) - 0.5 * modulus * square)
+    tile.volume(lane) * (more.density(law, place, tile.element(lane), h, [i, j]) - 0.5 * modulus * square)
 }
 
 /// What an element adds to it, J: where it is crushed also the energy of [`super::barrier`].

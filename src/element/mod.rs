@@ -19,6 +19,7 @@ mod fibres;
 mod fields;
 mod internal_forces;
 mod kernels;
+mod matrix;
 mod nodal_volume;
 mod nodal_volume_bounds;
 mod node;
@@ -70,8 +71,10 @@ pub(crate) use fibre_tangent::FibreTangent;
 pub(crate) use fibres::{Fibrous, unit_directions};
 pub(crate) use fields::{MoreEnergy, element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
-pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
+pub(crate) use fields::{invariants, pressure_at, stabilising_modulus, volume_ratio};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
+#[cfg(feature = "std")]
+pub(crate) use matrix::{cofactor, inner, outer};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};

@@ -17,8 +17,8 @@ use crate::simd::Real;
 /// Terms of the energy: of the first family, of the second one, and of the shear between them.
 pub const FIBRE_TERMS: usize = 3;
 
-/// The names of the terms in scene files.
-const TERMS: [&str; FIBRE_TERMS] = ["fibres", "sheets", "coupling"];
+/// The names of the terms, in scene files and for people.
+pub const FIBRE_NAMES: [&str; FIBRE_TERMS] = ["fibres", "sheets", "coupling"];
 
 /// The fibres of a tissue, or [none](Self::NONE).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,7 +41,7 @@ pub struct FibreError {
 
 impl fmt::Display for FibreError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = TERMS.get(self.term).copied().unwrap_or_default();
+        let name = FIBRE_NAMES.get(self.term).copied().unwrap_or_default();
         let what = if self.constant == 0 { "stiffness a (Pa)" } else { "exponent b" };
         write!(f, "the {what} of {name} is {}: it must be a finite positive number", self.value)
     }
@@ -111,7 +111,7 @@ impl Fibres {
 /// For people.
 impl fmt::Display for Fibres {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let terms = self.terms.iter().zip(TERMS).filter(|([a, _], _)| *a > 0.0);
+        let terms = self.terms.iter().zip(FIBRE_NAMES).filter(|([a, _], _)| *a > 0.0);
         for (place, ([a, b], name)) in terms.enumerate() {
             write!(f, "{}{name} a {a} Pa, b {b}", if place > 0 { ", " } else { "" })?;
         }

@@ -52,7 +52,7 @@ mod tissue;
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
 pub(crate) use fibres::FibreTerm;
-pub use fibres::{Directions, FIBRE_TERMS, FibreError, Fibres};
+pub use fibres::{Directions, FIBRE_NAMES, FIBRE_TERMS, FibreError, Fibres};
 pub use moduli::Moduli;
 #[cfg(feature = "capi-neo-hookean")]
 pub(crate) use prony::{LONGEST, MOST_SHARE, SHORTEST};

@@ -123,42 +123,6 @@ pub trait Material: Sync {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalPressure<M>(pub M);
 
-impl<M: Material> Material for NodalPressure<M> {
-    type Law = M::Law;
-
-    #[inline(always)]
-    fn prony(&self) -> &[Prony] {
-        self.0.prony()
-    }
-
-    #[inline(always)]
-    fn fibres(&self) -> &[Fibres] {
-        self.0.fibres()
-    }
-
-    #[inline(always)]
-    fn directions(&self) -> &[Directions] {
-        self.0.directions()
-    }
-
-    #[inline(always)]
-    fn element(&self) -> Element {
-        Element::NodalPressure
-    }
-
-    fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
-        self.0.tissue(element)
-    }
-
-    fn laws(&self) -> Laws<'_, M::Law> {
-        self.0.laws()
-    }
-
-    fn region(&self, element: usize) -> u16 {
-        self.0.region(element)
-    }
-}
-
 /// The same material in tetrahedra with stabilised nodal strain, which bend as they should on coarse meshes: all energy
 /// is taken at the nodes, from the mean displacement gradient of the elements of one tissue around them, and a
 /// quadratic energy holds what the mean does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Elements that are
@@ -173,41 +137,49 @@ impl<M: Material> Material for NodalPressure<M> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalStrain<M>(pub M);
 
-impl<M: Material> Material for NodalStrain<M> {
-    type Law = M::Law;
+/// The same material in other tetrahedra.
+macro_rules! other_elements {
+    ($($element:ident,)*) => {
+        $(
+            impl<M: Material> Material for $element<M> {
+                type Law = M::Law;
 
-    #[inline(always)]
-    fn prony(&self) -> &[Prony] {
-        self.0.prony()
-    }
+                #[inline(always)]
+                fn element(&self) -> Element {
+                    Element::$element
+                }
 
-    #[inline(always)]
-    fn fibres(&self) -> &[Fibres] {
-        self.0.fibres()
-    }
+                fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
+                    self.0.tissue(element)
+                }
 
-    #[inline(always)]
-    fn directions(&self) -> &[Directions] {
-        self.0.directions()
-    }
+                fn laws(&self) -> Laws<'_, M::Law> {
+                    self.0.laws()
+                }
 
-    #[inline(always)]
-    fn element(&self) -> Element {
-        Element::NodalStrain
-    }
+                fn region(&self, element: usize) -> u16 {
+                    self.0.region(element)
+                }
 
-    fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
-        self.0.tissue(element)
-    }
+                #[inline(always)]
+                fn prony(&self) -> &[Prony] {
+                    self.0.prony()
+                }
 
-    fn laws(&self) -> Laws<'_, M::Law> {
-        self.0.laws()
-    }
+                #[inline(always)]
+                fn fibres(&self) -> &[Fibres] {
+                    self.0.fibres()
+                }
 
-    fn region(&self, element: usize) -> u16 {
-        self.0.region(element)
-    }
+                #[inline(always)]
+                fn directions(&self) -> &[Directions] {
+                    self.0.directions()
+                }
+            }
+        )*
+    };
 }
+other_elements!(NodalPressure, NodalStrain,);
 
 /// The constants of each element, as the element loops want them.
 #[derive(Clone, Copy, Debug)]

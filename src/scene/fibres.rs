@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{BuildError, SceneFacts, SceneView, tiles_for};
 use crate::element::{ElementTile, FibreTile, Fibrous, patch_tiles_for, unit_directions};
-use crate::material::{Element, Fibres, Laws, Material};
+use crate::material::{Element, Fibres, Material};
 use crate::simd::TILE;
 
 /// Tiles of directions ([`FibreTile`]) that are enough for any scene of so many nodes, elements and tissues.
@@ -77,11 +77,7 @@ impl<'a, M: Material> SceneView<'a, M> {
         if self.material.fibres().is_empty() || self.facts.families == 0 {
             return None;
         }
-        let of_element = match self.material.laws() {
-            Laws::One(_) => &[],
-            Laws::Regions { of_element, .. } => of_element,
-        };
         let (tissues, families) = (self.material.fibres(), self.facts.families);
-        Some(Fibrous { tissues, of_element, tiles: self.fibres, families })
+        Some(Fibrous { tissues, of_element: self.tissues_of_elements(), tiles: self.fibres, families })
     }
 }

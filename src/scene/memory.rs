@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::{SceneFacts, SceneView, fibre_tiles_for};
 use crate::element::{Series, VECTORS_OF_TERM};
-use crate::material::{Element, Laws, Material, Prony};
+use crate::material::{Element, Material, Prony};
 
 /// No fewer than [`SceneView::memory_vectors`] of any scene of so many nodes, elements and tissues, none of which
 /// relaxes with more `terms`.
@@ -74,10 +74,7 @@ impl<'a, M: Material> SceneView<'a, M> {
         if self.vectors_of_tile() == 0 {
             return None;
         }
-        let of_element = match self.material.laws() {
-            Laws::One(_) => &[],
-            Laws::Regions { of_element, .. } => of_element,
-        };
+        let of_element = self.tissues_of_elements();
         Some(Series { tissues: self.material.prony(), of_element, terms: self.facts.terms, halves, step })
     }
 }

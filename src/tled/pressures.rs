@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use glam::DVec3;
 
-use crate::element::{ElementMaterial, element_fields, invariants, pressure_at};
+use crate::element::{ElementMaterial, invariants, pressure_at, volume_ratio};
 use crate::material::{Law, Potential};
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
@@ -35,7 +35,7 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     }
     for (tile, lane, law) in scene.laws_at_places() {
         let volume = f64::from(tile.volume::<f32>(lane));
-        let ratio = element_fields(&law, tile, lane, state.displacement, |_| glam::DMat3::ZERO).volume_ratio;
+        let ratio = volume_ratio(tile, lane, state.displacement);
         for corner in 0..4 {
             if let Some((sum, weight)) = sums.get_mut(tile.node(corner, lane)) {
                 *sum += volume * pressure_at(&law, tile, lane, corner, ratio, volumes);

@@ -5,7 +5,7 @@ use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
 
-use crate::element::{ElementTile, FibreTangent, barrier_factor, barrier_modulus, place_in};
+use crate::element::{ElementTile, FibreTangent, barrier_factor, barrier_modulus, cofactor, inner, outer, place_in};
 use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -166,7 +166,7 @@ impl LawTangent {
     pub(super) fn new<L: Law>(law: &L, h: DMat3, fibres: Option<FibreTangent>) -> Self {
         let f = DMat3::IDENTITY + h;
         let cofactor = cofactor(f);
-        let square = inner3(f, f);
+        let square = inner(f, f);
         let volume_ratio = f.determinant();
         let at = Invariants { i: (square - 3.0) as f32, j: (volume_ratio - 1.0) as f32 };
         let wide = law_at(law);
@@ -197,7 +197,7 @@ impl LawTangent {
         if slope == 0.0 {
             return None;
         }
-        let (modulus, square) = (f64::from(barrier_modulus(law)), inner3(self.f, self.f));
+        let (modulus, square) = (f64::from(barrier_modulus(law)), inner(self.f, self.f));
         Some(Self {
             p1: 2.0 * modulus * h,
             p_j: modulus * slope * square,
@@ -221,7 +221,7 @@ impl LawTangent {
     /// Its change with one of the deformation gradient.
     pub(super) fn stress_by(&self, df: DMat3) -> DMat3 {
         let (f, c) = (self.f, self.cofactor);
-        let (df_f, df_c) = (inner3(f, df), inner3(c, df));
+        let (df_f, df_c) = (inner(f, df), inner(c, df));
         let dx = self.x_f * df_f + self.x_c * df_c;
         let d_cofactor = cofactor(f + df) - cofactor(f - df);
         df * self.p1
@@ -237,22 +237,9 @@ fn law_at<L: Law>(law: &L) -> L::Wide<f32> {
     law.splat()
 }
 
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
-
-fn inner3(a: DMat3, b: DMat3) -> f64 {
-    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
-}
-
 /// `[a]_x`, so that `[a]_x b` is the cross product of a and b.
 fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
-}
-
-/// The cofactor matrix, quadratic in `f`: a central difference of it is its exact derivative.
-fn cofactor(f: DMat3) -> DMat3 {
-    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }
 
 #[cfg(test)]

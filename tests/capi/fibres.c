@@ -3,6 +3,7 @@
 #include "body.h"
 
 enum { ROOM = PARTS == 1 ? 8 << 20 : 48 << 20 };
+#define OF_TISSUE
 #include "simulated.h"
 #define FIBRES_SIZE SUPPLE_FIBRES_SIZE(NODES, TETS, 1, ELEMENT)
 /* Of two tissues. */
@@ -18,19 +19,13 @@ SUPPLE_MEMORY(first_memory, ROOM);
 SUPPLE_MEMORY(second_memory, ROOM);
 SUPPLE_MEMORY(settle_memory, SUPPLE_SETTLE_SIZE(NODES));
 static unsigned char saved[48 * NODES + 256];
-static float moved[NODES][3], forces[NODES][3], directions[TETS][2][3];
+static float forces[NODES][3], directions[TETS][2][3];
 static uint16_t tissue_of[TETS];
 static uint8_t removed[TETS];
 
 /* Constants of Holzapfel & Ogden 2009, table 1: a (Pa), b. */
 static const supple_fibres myocardium = {{18472.0f, 16.026f}, {2481.0f, 11.12f}, {216.0f, 11.436f}};
 static const supple_fibres one_family = {{18472.0f, 16.026f}, {0.0f, 0.0f}, {0.0f, 0.0f}}, none = {{0.0f, 7.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}};
-
-static double exponential(double x) {
-    double sum = 1.0, term = 1.0;
-    for (int n = 1; n < 60; n++) term *= x / n, sum += term;
-    return sum;
-}
 
 /* a x exp(b x^2), Pa. */
 static double slope(const float term[2], double x) { return (double)term[0] * x * exponential((double)term[1] * x * x); }
@@ -114,28 +109,15 @@ static void each_tissue_has_its_own(void) {
     point((const float[3]){0.0f, 0.0f, 1.0f}, (const float[3]){1.0f, 0.0f, 0.0f});
 }
 
-static supple_settings settings_of(uint32_t steps) {
-    supple_settings made;
-    CHECK(supple_default_settings(&made) == SUPPLE_OK);
-    made.steps = steps, made.damping = 20.0f, made.forces = 1, made.motions = MOTIONS;
-    if (steps == SUPPLE_STEPS_EXACT) made.seconds = 5e-5f;
-    return made;
-}
+static supple_settings settings_of(uint32_t steps) { return damped(steps, 5e-5f); }
 
-static void pull(supple_sim *sim) {
-    CHECK(supple_set_gravity(objects_of(sim).loads, (const float[3]){0.0f, 3.0f, 0.0f}) == SUPPLE_OK);
-}
+static void pull(supple_sim *sim) { pull_along_y(sim, 3.0f); }
 
 /* A pull along y, which the middle of the bar follows. */
 static supple_sim *hanging(unsigned char *memory, const supple_settings *settings) {
     supple_sim *sim = set_up(memory, settings);
     pull(sim);
     return sim;
-}
-
-static uint64_t where(supple_sim *sim) {
-    CHECK(supple_copy_displacements(objects_of(sim).state, moved[0], 3 * NODES) == SUPPLE_OK);
-    return hash(moved, sizeof moved);
 }
 
 /* The mean along y of the nodes on a side of the bar, m. */

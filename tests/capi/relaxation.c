@@ -3,6 +3,7 @@
 #include "body.h"
 
 enum { ROOM = PARTS == 1 ? 8 << 20 : 48 << 20, TERMS = 2 };
+#define OF_TISSUE
 #include "simulated.h"
 #define STATE_SIZE (SUPPLE_STATE_SIZE(NODES, ELEMENT) + SUPPLE_RELAXATION_SIZE(NODES, TETS, 1, ELEMENT, TERMS))
 
@@ -15,17 +16,11 @@ SUPPLE_MEMORY(second_memory, ROOM);
 SUPPLE_MEMORY(third_memory, ROOM);
 SUPPLE_MEMORY(settle_memory, SUPPLE_SETTLE_SIZE(NODES));
 static unsigned char saved[1 + 144 + 48 * NODES + 16 + STATE_SIZE / 2], again[sizeof saved];
-static float moved[NODES][3], forces[NODES][3];
+static float forces[NODES][3];
 static uint8_t removed[TETS];
 
 /* Shares and times (s) of the terms. The second one stands behind a place without one. */
 static const supple_prony series = {{0.5f, 0.0f, 0.2f}, {0.01f, 0.0f, 0.1f}}, none = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
-
-static double exponential(double x) {
-    double sum = 1.0, term = 1.0;
-    for (int n = 1; n < 60; n++) term *= x / n, sum += term;
-    return sum;
-}
 
 /* The force along an axis on the last layer, all of whose nodes are held where a shear or a dilation brings them, after each of
  * some steps: of what relaxes it is that of the law times 1 - sum g (1 - e^(-t / tau)), of pressure that of the law. */
@@ -66,24 +61,13 @@ static void relaxes_as_the_closed_form(int shears) {
     CHECK(fabs(first) > 0.01 && worst < 1e-5);
 }
 
-static supple_settings settings_of(uint32_t steps) {
-    supple_settings made;
-    CHECK(supple_default_settings(&made) == SUPPLE_OK);
-    made.steps = steps, made.damping = 20.0f, made.forces = 1, made.motions = MOTIONS;
-    if (steps == SUPPLE_STEPS_EXACT) made.seconds = 1e-4f;
-    return made;
-}
+static supple_settings settings_of(uint32_t steps) { return damped(steps, 1e-4f); }
 
 /* A pull along y, which the middle of the bar follows. */
 static supple_sim *hanging(unsigned char *memory, const supple_settings *settings) {
     supple_sim *sim = set_up(memory, settings);
-    CHECK(supple_set_gravity(objects_of(sim).loads, (const float[3]){0.0f, 0.5f, 0.0f}) == SUPPLE_OK);
+    pull_along_y(sim, 0.5f);
     return sim;
-}
-
-static uint64_t where(supple_sim *sim) {
-    CHECK(supple_copy_displacements(objects_of(sim).state, moved[0], 3 * NODES) == SUPPLE_OK);
-    return hash(moved, sizeof moved);
 }
 
 /* The mean of all nodes along y, m. */

@@ -4,12 +4,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
+use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, Motion};
 use supple::mlp::{ForceInput, Network, Range, write};
-use supple::scene::{Axes, Support};
-use supple::state::NodeVector;
+use supple::scene::{Axes, Support, VecScene};
+use supple::state::{NodeVector, VecState};
 use supple::step::{MOST_PARTS, Status, Step, Threads};
 use supple::tled;
 
@@ -40,6 +41,22 @@ impl Threads for Backwards {
             }
         });
     }
+}
+
+/// Thirty steps (s) of a scene under gravity give the same bits by every number of parts.
+pub(crate) fn same_bits_in_parts<M: ElementMaterial>(scene: &VecScene<M>, seconds: f32) {
+    let loads = Loads::new(scene, [0.0, -9.81, 0.0], &[], &[]).unwrap();
+    let step = Step::unchecked(seconds, 20.0).unwrap();
+    let of = |parts: usize| {
+        let threads = Backwards { parts, most: AtomicUsize::new(0) };
+        let mut state = VecState::of(scene.view());
+        for _ in 0..30 {
+            taken(tled::step_in_parts(scene.view(), &loads, state.view(), &step, &threads));
+        }
+        bits(&state)
+    };
+    let one = of(1);
+    assert!((2..=4).all(|parts| of(parts) == one), "{:?}", scene.view().element());
 }
 
 fn taken(status: Status) {

@@ -1,8 +1,6 @@
 //! What steps promise of tissue that relaxes: a refused step leaves no trace, threads and methods agree, rest is that of
 //! the softened law, a scene that takes another's place keeps what tissue remembers.
 
-use std::sync::atomic::AtomicUsize;
-
 use supple::guard::{EVERY, Guard};
 use supple::inertia::{self, Cells, LargeStep};
 use supple::loads::{Loads, NodalForce};
@@ -13,7 +11,7 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{Cause, Divergence, Status, Step};
 use supple::tled;
 
-use crate::parts::Backwards;
+use crate::parts::same_bits_in_parts;
 use crate::support::{Body, EXP, NEO, bits, bound, largest_distance, to_f64};
 
 const ELEMENTS: [Element; 3] = Element::ALL;
@@ -83,19 +81,7 @@ fn every_number_of_threads_gives_the_same_bits() {
         let several = VecMaterial { element, law: EXP, tissues, of_element, prony, fibres: vec![], directions: vec![] };
         for material in [material(element, EXP, &TERMS), several] {
             let scene = VecScene::build(material, &body.mesh(), &held(&body)).unwrap();
-            let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap();
-            let step = Step::unchecked(2e-5, 20.0).unwrap();
-            let of = |parts: usize| {
-                let threads = Backwards { parts, most: AtomicUsize::new(0) };
-                let mut state = VecState::of(scene.view());
-                for _ in 0..30 {
-                    let status = tled::step_in_parts(scene.view(), &loads, state.view(), &step, &threads);
-                    assert!(status.is_taken(), "{status:?}");
-                }
-                bits(&state)
-            };
-            let one = of(1);
-            assert!((2..=4).all(|parts| of(parts) == one), "{element:?}");
+            same_bits_in_parts(&scene, 2e-5);
         }
     }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use supple::inertia::{Cells, Method};
-use supple::io::parse_msh;
+use supple::io::{TetMesh, parse_msh};
 use supple::loads::Motion;
 use supple::material::{AnyLaw, Element, Exponential, Tissue};
 use supple::mesh::Winding;
@@ -73,10 +73,11 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     output!("A liver with a tumour and two vessels hangs from the diaphragm, which breathes in; a probe presses it.\n");
     let mut folder = None;
     let mut runs = vec![];
+    let mesh = mesh()?;
     for steps in [Steps::Exact, Steps::Long, Steps::Auto, Steps::Learned] {
         // Frames for ParaView of the first run.
         let out = folder.is_none().then_some(Out { path: out, force: true });
-        let (run, made) = run(liver(steps)?, steps.name(), out)?;
+        let (run, made) = run(liver(mesh.clone(), steps), steps.name(), out)?;
         folder = folder.or(made);
         runs.push(run);
     }
@@ -122,11 +123,15 @@ fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, O
     Ok((Run { setup, name, done }, folder))
 }
 
+/// The lobe of the library's meshes, refined.
+fn mesh() -> Result<TetMesh, Problem> {
+    let lobe = parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)?;
+    let (points, tets) = refined(lobe.points, &lobe.tets);
+    Ok(TetMesh { points, tets, ..TetMesh::default() })
+}
+
 /// The liver with what holds it, the probe, and what moves both.
-fn liver(steps: Steps) -> Result<Setup, Problem> {
-    let mut mesh = parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)?;
-    (mesh.points, mesh.tets) = refined(mesh.points, &mesh.tets);
-    (mesh.triangles, mesh.regions) = (vec![], vec![]);
+fn liver(mesh: TetMesh, steps: Steps) -> Setup {
     let body = Body::new(mesh, Winding::Checked, "liver lobe".into());
     let mut setup = Setup::of_body(body, TISSUE, DENSITY);
     setup.tissues = tissues(&setup.body);
@@ -153,7 +158,7 @@ fn liver(steps: Steps) -> Result<Setup, Problem> {
             setup.learned = Some(LearnedChoice::of_demo("compact-50-i8.weights", NETWORK));
         }
     }
-    Ok(setup)
+    setup
 }
 
 /// Liver, tumour and vessels, by the middle of each element.

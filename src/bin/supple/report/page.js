@@ -146,8 +146,7 @@ async function show(plot, frame) {
     for (const [trace, frames] of motion.points) {
         const [x, y, z] = places(frames[frame]);
         change.x.push(x); change.y.push(y); change.z.push(z);
-        const [a, b, c] = places(frames[0]);
-        change.intensity.push(data[trace].intensity ? fromMean([x, y, z], [a, b, c]) : undefined);
+        change.intensity.push(data[trace].intensity ? fromMean([x, y, z], (frames.first ??= places(frames[0]))) : undefined);
     }
     await Plotly.restyle(plot, change, motion.points.map(([trace]) => trace));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use supple::material::{AnyLaw, Directions, Element, FIBRE_TERMS, Fibres, Law, Moduli, Prony, Tissue, VecMaterial};
+use supple::material::{AnyLaw, Directions, Element, FIBRE_NAMES, Fibres, Law, Moduli, Prony, Tissue, VecMaterial};
 use supple::mlp::Recipe;
 use supple::plausibility::same;
 use toml::Spanned;
@@ -30,13 +30,12 @@ pub struct Tissues {
 }
 
 /// Keys of `[material]` that are no constants of a law; a region has the same but for the law.
-const KEYS: [&str; 6] = ["law", "density", "prony", "fibres", "sheets", "coupling"];
+const KEYS: [&str; 6] = ["law", "density", "prony", FIBRE_NAMES[0], FIBRE_NAMES[1], FIBRE_NAMES[2]];
 
 impl Tissues {
     /// The same everywhere.
     pub(crate) fn one(tissue: Tissue<AnyLaw>) -> Self {
-        let (prony, fibres) = (vec![Prony::NONE], vec![Fibres::NONE]);
-        Self { tissues: vec![tissue], prony, fibres, directions: vec![], of_element: vec![] }
+        Self::several(vec![tissue], vec![])
     }
 
     /// Of each element the one with this index.
@@ -247,9 +246,8 @@ impl<'a> Table<'a> {
     /// The fibres, of which what is not given is that of `others`: an empty list is no such term.
     fn fibres(&self, others: Fibres) -> Result<Fibres, Problem> {
         let mut terms = others.terms().map(|[a, b]| (a > 0.0).then_some([a, b]));
-        let keys: [_; FIBRE_TERMS] = ["fibres", "sheets", "coupling"];
         let mut fibres = others;
-        for (term, key) in keys.into_iter().enumerate() {
+        for (term, key) in FIBRE_NAMES.into_iter().enumerate() {
             let Some(given) = self.get::<Vec<f32>>(key)? else { continue };
             terms[term] = match given.get_ref()[..] {
                 [] => None,
