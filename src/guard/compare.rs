@@ -33,6 +33,12 @@ pub(super) fn compare(nodes: usize, first: &[NodeVector], second: &[NodeVector])
     Comparison { mean, largest, motion, ..far }
 }
 
+/// The mean length of so many vectors.
+pub(super) fn mean_length(nodes: usize, vectors: &[NodeVector]) -> f32 {
+    let lengths = vectors.iter().take(nodes).map(|vector| Vec4::from(vector.0).truncate().length());
+    lengths.sum::<f32>() / nodes.max(1) as f32
+}
+
 /// The same, or the largest number instead of infinity or of what is no number, which are no reason to be content.
 pub(super) const fn finite(value: f32) -> f32 {
     if value.is_nan() || value == f32::INFINITY { f32::MAX } else { value }

@@ -34,7 +34,7 @@ use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{Mark, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads};
-use compare::compare;
+use compare::{compare, mean_length};
 use estimate::Envelope;
 
 /// Steps of the first run in one of the second, where nothing speaks for another number. With more, a guard costs less
@@ -325,7 +325,7 @@ impl GuardView<'_> {
             // Else the rounding of each step would part them in a long session.
             second.progress.time = state.time();
             large.is_at(second.progress);
-            let speed = if envelope.is_new() { mean_speed(&state) } else { 0.0 };
+            let speed = if envelope.is_new() { mean_length(nodes, state.increment) / state.last_step() } else { 0.0 };
             envelope.add(&compare(nodes, state.displacement, second.displacement), gone, speed);
             let more = if envelope.is_new() { 0.0 } else { state.last_step() };
             // Whole steps of the first run: the second run's are then of one length.
@@ -391,16 +391,6 @@ fn split<'a, M: Material>(
     let (memory, rest) = rest.split_at_mut_checked(scene.memory_vectors())?;
     let state = StateView::new(displacement, remainder, increment, force, volume, progress);
     Some((state.remembering(memory), rest))
-}
-
-/// Of the nodes, m/s.
-fn mean_speed(state: &StateView<'_>) -> f32 {
-    let lengths = state.increment.iter().map(|increment| {
-        let [x, y, z] = increment.to_array();
-        f64::from(libm::sqrtf(x * x + y * y + z * z))
-    });
-    let nodes = state.increment.len().max(1) as f64;
-    (lengths.sum::<f64>() / nodes) as f32 / state.last_step()
 }
 
 /// Makes the second run start from the state of the first.

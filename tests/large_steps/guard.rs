@@ -166,6 +166,28 @@ fn a_state_that_was_reset_begins_a_new_second_run() {
     }
 }
 
+/// Places of which a scene makes no use, as a state of fixed size has them, do not slow a body down.
+#[test]
+fn room_to_spare_changes_no_estimate() {
+    let (body, scene) = bar();
+    let loads = Loads::new(&scene, [2.0, 0.0, 0.0], &[], &[]).unwrap();
+    let estimates = |room: usize| {
+        let mut state = VecState::at_rest(room * scene.node_count());
+        let (mut large, mut guard) = prepared(&body, &scene, &mut state, 2e-3);
+        let mut estimates = vec![];
+        for _ in 0..40 {
+            let status = large.step(scene.view(), &loads, state.view());
+            let _ = guard.follow(status, scene.view(), &loads, state.view());
+            estimates.push(guard.estimate().map(|estimate| [estimate.mean, estimate.largest]));
+        }
+        estimates
+    };
+    let [narrow, wide] = [1, 8].map(estimates);
+    println!("{:?} m at first, {:?} at last", narrow.iter().flatten().next(), narrow.last());
+    assert!(narrow.iter().flatten().count() > 20);
+    assert_eq!(narrow, wide);
+}
+
 #[test]
 fn memory_that_is_too_small_is_told_with_what_is_needed() {
     let (body, scene) = bar();
