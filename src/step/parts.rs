@@ -277,6 +277,7 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     let elements = scene.elements();
     // Seen by the compiler, which then leaves these kernels out where no tissue can relax or has fibres.
     let (fibres, past) = (scene.fibrous(), past.filter(|_| scene.vectors_of_tile() > 0));
+    let is_extended = fibres.is_some() || past.is_some();
     if scene.element().is_nodal_strain() {
         let (laws, patches, visitor) = (elements.laws, scene.patches, PhantomData);
         let ([displacement, remainder], of) = (moved, partitions.clone());
@@ -291,9 +292,11 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
             visitor,
             extension: NoExtension,
         };
-        let mut extremes = match extension_of(patches.tiles(), fibres, past) {
-            None => V::patch_forces(kernel),
-            Some(extension) => V::extended_patch_forces(kernel.with_extension(extension)),
+        let mut extremes = if is_extended {
+            let extension = extension_of(patches.tiles(), fibres, past);
+            V::extended_patch_forces(kernel.with_extension(extension))
+        } else {
+            V::patch_forces(kernel)
         };
         let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS);
         extremes.least_change = extremes.least_change.min(least);
@@ -301,23 +304,26 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
-        match extension_of(scene.tiles, fibres, past) {
-            None => V::nodal_pressure_forces(kernel),
-            Some(extension) => V::extended_nodal_pressure_forces(kernel.with_extension(extension)),
+        if is_extended {
+            let extension = extension_of(scene.tiles, fibres, past);
+            V::extended_nodal_pressure_forces(kernel.with_extension(extension))
+        } else {
+            V::nodal_pressure_forces(kernel)
         }
     } else {
         let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
-        match extension_of(scene.tiles, fibres, past) {
-            None => V::forces(kernel),
-            Some(extension) => V::extended_forces(kernel.with_extension(extension)),
+        if is_extended {
+            let extension = extension_of(scene.tiles, fibres, past);
+            V::extended_forces(kernel.with_extension(extension))
+        } else {
+            V::forces(kernel)
         }
     }
 }
 
-/// Nothing where there are neither fibres nor relaxation.
-fn extension_of<'a, T>(table: &[T], fibres: Option<Fibrous<'a>>, past: Option<PastOfPart<'a>>) -> Option<Extended<'a>> {
+fn extension_of<'a, T>(table: &[T], fibres: Option<Fibrous<'a>>, past: Option<PastOfPart<'a>>) -> Extended<'a> {
     let relaxing = past.map(|(series, before, after, own)| Relaxing::new(series, table, before, after, own));
-    (fibres.is_some() || relaxing.is_some()).then(|| Extended::new(table, fibres, relaxing))
+    Extended::new(table, fibres, relaxing)
 }
 
 /// Gravity and nodal forces on the nodes from `first` on, N.
