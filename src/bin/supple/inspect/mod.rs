@@ -14,6 +14,7 @@ use supple::mesh::Winding;
 use crate::problem::Problem;
 use crate::scene::body::Body;
 use crate::scene::file::SceneFile;
+use crate::scene::plausible::size_remark;
 use crate::scene::setup::Setup;
 use crate::screen::output;
 use crate::weight_file::is_weights;
@@ -42,5 +43,10 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
     if is_weights {
         return network::inspect(path);
     }
-    mesh::describe(&Body::read(path, 1.0, Winding::Checked)?)
+    let body = Body::read(path, 1.0, Winding::Checked)?;
+    mesh::describe(&body)?;
+    if let Some(remark) = size_remark(&body) {
+        output!("warning: {}", Problem::in_file(path, remark));
+    }
+    Ok(())
 }

@@ -9,7 +9,7 @@ pub mod file;
 pub mod instruments;
 pub(crate) mod learned;
 pub(crate) mod loads;
-mod plausible;
+pub(crate) mod plausible;
 pub mod points;
 pub mod pulls;
 pub(crate) mod select;

@@ -3,13 +3,19 @@
 
 use supple::element::Axes;
 use supple::loads::{Motion, NodalForce};
-use supple::plausibility::{Proportions, Remark, of_gravity, of_mass, of_size, of_supports, of_tissue};
+use supple::plausibility::{Proportions, of_gravity, of_mass, of_size, of_supports, of_tissue};
 use supple::scene::Support;
 
 use super::body::Body;
 use super::file::SceneFile;
 use super::tissues::Tissues;
 use crate::problem::Problem;
+
+/// What does not look right in the size of a mesh, and the remedy.
+pub(crate) fn size_remark(body: &Body) -> Option<String> {
+    let remark = of_size(body.diagonal())?;
+    Some(format!("{remark}; scale = 0.001 under [mesh] turns millimetres into metres"))
+}
 
 /// What does not look right.
 pub(crate) fn warnings(
@@ -22,13 +28,8 @@ pub(crate) fn warnings(
 ) -> Vec<String> {
     let scene = &file.scene;
     let proportions = Proportions::of_tissues(body.diagonal(), body.volumes().sum(), tissues.of_regions());
-    let of_mesh = of_size(proportions.diagonal).into_iter().chain(of_mass(tissues.mass(body)));
-    let of_mesh = of_mesh.map(|remark| match remark {
-        Remark::Size(_) => {
-            file.problem(&scene.mesh, format!("{remark}; scale = 0.001 under [mesh] turns millimetres into metres"))
-        }
-        _ => file.problem(&scene.mesh, remark),
-    });
+    let of_mass = of_mass(tissues.mass(body)).map(|remark| remark.to_string());
+    let of_mesh = size_remark(body).into_iter().chain(of_mass).map(|remark| file.problem(&scene.mesh, remark));
     let of_tissues = tissues.of_regions().flat_map(|(density, moduli)| of_tissue(density, &moduli));
     let of_tissues = of_tissues.map(|remark| file.problem(&scene.material, remark));
     let of_motions = scene.motion.iter().filter_map(|at| {
