@@ -111,7 +111,7 @@ pub fn fit(
 ) -> Result<Fitted, TrainError> {
     if samples.inputs.is_empty() {
         let scene = &recipe.motion.scene;
-        let text = format!("scene = {scene:?}: every vertex is held or loaded, none is left to learn from");
+        let text = format!("scene = {scene:?}: every vertex is held, or loaded alone, none is left to learn from");
         return Err(TrainError::Recipe(text));
     }
     let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();

@@ -6,10 +6,12 @@
 //! ```
 //! Copies of each frame in rough motion may be added, see [`super::noise`].
 //!
-//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Local frames
-//! follow the motion once each `D`, as they do in a roll-out; where the paper's samples lie closer than `D`, several
-//! sequences of local frames are kept at the same time, each with its own start.
+//! Vertices that are held are left out, and such as are loaded alone, as in the paper: boundary conditions make them
+//! jump. Loaded vertices that share elements, as those of a traction, are sampled: they move on as the others do, and
+//! may be many. Local frames follow the motion once each `D`, as they do in a roll-out; where the paper's samples lie
+//! closer than `D`, several sequences of local frames are kept at the same time, each with its own start.
 
+use core::array::from_fn;
 use std::format;
 use std::string::ToString;
 use std::vec;
@@ -23,7 +25,9 @@ use super::recipe::Recipe;
 use super::{TrainError, TrainingScene};
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, PREDICTED};
+use crate::material::VecMaterial;
 use crate::mlp::Range;
+use crate::scene::SceneView;
 use crate::state::{NodeVector, VecState};
 use crate::step::{Status, Step};
 use crate::tled;
@@ -170,19 +174,29 @@ impl Schedule {
     }
 }
 
-/// Of so many vertices those that may move, and of these the ones without a force on them.
-fn free_and_sampled(exemplar: &dyn TrainingScene, nodes: usize) -> (Vec<bool>, Vec<usize>) {
-    let without = |mut marks: Vec<bool>, nodes: &mut dyn Iterator<Item = u32>| {
+/// Of the vertices those that may move, and of these the sampled ones.
+fn free_and_sampled(exemplar: &dyn TrainingScene, scene: SceneView<'_, VecMaterial>) -> (Vec<bool>, Vec<usize>) {
+    let marked = |nodes: &mut dyn Iterator<Item = u32>| {
+        let mut marks = vec![false; scene.node_count()];
         for node in nodes {
             if let Some(mark) = marks.get_mut(node as usize) {
-                *mark = false;
+                *mark = true;
             }
         }
         marks
     };
-    let free = without(vec![true; nodes], &mut exemplar.supports().iter().map(|support| support.node));
-    let sampled = without(free.clone(), &mut exemplar.forces().iter().map(|force| force.node));
-    (free, (0..nodes).filter(|&node| sampled[node]).collect())
+    let held = marked(&mut exemplar.supports().iter().map(|support| support.node));
+    let loaded = marked(&mut exemplar.forces().iter().map(|force| force.node));
+    let mut neighbours = vec![false; loaded.len()];
+    for (tile, lane) in scene.places() {
+        let corners: [usize; 4] = from_fn(|corner| tile.node(corner, lane));
+        if corners.iter().filter(|&&node| loaded[node]).count() > 1 {
+            corners.iter().for_each(|&node| neighbours[node] = true);
+        }
+    }
+    let sampled = (0..loaded.len()).filter(|&node| !held[node] && (!loaded[node] || neighbours[node]));
+    let sampled = sampled.collect();
+    (held.into_iter().map(|held| !held).collect(), sampled)
 }
 
 fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, TrainError> {
@@ -192,7 +206,7 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
     let step = step.map_err(|error| TrainError::Scene(error.to_string()))?;
     let nodes = scene.node_count();
     let mut state = VecState::at_rest(nodes);
-    let (free, sampled) = free_and_sampled(exemplar, nodes);
+    let (free, sampled) = free_and_sampled(exemplar, scene.view());
     let mut random = Random(recipe.seed);
     let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
     let seen_as = SeenAs { masses: &masses, force: recipe.network.force };

@@ -24,7 +24,7 @@ pub trait TrainingScene {
     /// Held nodes, which are not sampled.
     fn supports(&self) -> &[Support];
 
-    /// Forces, whose nodes are not sampled either.
+    /// Forces; a node that is loaded alone is not sampled either ([`super::samples`]).
     fn forces(&self) -> &[NodalForce];
 
     /// Builds the scene.
