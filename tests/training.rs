@@ -47,8 +47,8 @@ held_out = 0.2
 
 fn samples() -> (Recipe, SceneSpec, Samples) {
     let recipe = Recipe::parse(RECIPE).unwrap();
-    let scene = training::scene(&recipe).unwrap();
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = training::scene(&recipe.motion[0]).unwrap();
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     (recipe, scene, samples)
 }
 
@@ -114,12 +114,12 @@ fn weights_say_where_they_come_from() {
 fn a_network_learns_from_any_scene_at_its_own_step() {
     let text = RECIPE.replace("\"torsion\"", "\"organ.toml\"").replace("load = 0.02", "load = 0.5");
     let recipe = Recipe::parse(&text).unwrap();
-    assert!(recipe.motion.is_file());
+    assert!(recipe.motion[0].is_file());
     let bar = named("stretch").unwrap();
     let timing = Timing { step: 5e-5, ..Timing::PAPER };
     let own = SceneSpec { element: Element::NodalPressure, damping: 7.0, density: 1_100.0, timing, ..bar };
-    let scene = own.with_load(recipe.motion.load);
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = own.with_load(recipe.motion[0].load);
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     assert_eq!(samples.inputs.len(), 20 * samples.vertices);
     let Fitted { bytes, .. } = fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(())).unwrap();
     let memory = WeightBytes::of(&bytes);
@@ -142,7 +142,7 @@ fn frames_are_spread_over_the_motion_at_every_step() {
     for multiple in [10, 20, 100] {
         let text = RECIPE.replace("multiple = 10", &format!("multiple = {multiple}"));
         let recipe = Recipe::parse(&text).unwrap();
-        let samples = Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap();
+        let samples = Samples::collect(&recipe, &[&training::scene(&recipe.motion[0]).unwrap()]).unwrap();
         assert_eq!(samples.inputs.len(), 20 * samples.vertices);
         assert_eq!(samples.targets.len(), samples.inputs.len());
         // The speed is that of the motion: it grows with the load, which is on a ramp.
@@ -189,7 +189,7 @@ fn a_recipe_that_cannot_be_used_says_why() {
     let said = |from: &str, to: &str| {
         assert!(RECIPE.contains(from));
         let recipe = Recipe::parse(&RECIPE.replace(from, to));
-        let said = recipe.and_then(|recipe| training::scene(&recipe)).unwrap_err().to_string();
+        let said = recipe.and_then(|recipe| training::scene(&recipe.motion[0])).unwrap_err().to_string();
         println!("{said}");
         said
     };
@@ -216,7 +216,7 @@ ease = 1.0
 
 fn collected(text: &str) -> Samples {
     let recipe = Recipe::parse(text).unwrap();
-    Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap()
+    Samples::collect(&recipe, &[&training::scene(&recipe.motion[0]).unwrap()]).unwrap()
 }
 
 #[test]
@@ -277,8 +277,8 @@ fn turned_normals_change_no_length() {
 fn a_motion_that_loads_every_vertex_leaves_nothing_to_learn() {
     let text = RECIPE.replace("torsion", "cylinder");
     let recipe = Recipe::parse(&text).unwrap();
-    let scene = training::scene(&recipe).unwrap();
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = training::scene(&recipe.motion[0]).unwrap();
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     let fitted = fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(()));
     let said = fitted.unwrap_err().to_string();
     assert!(said.starts_with("scene = \"cylinder\": every vertex is held or loaded"), "{said}");
