@@ -259,6 +259,31 @@ fn rough_motion_leads_back_to_the_exact_one() {
     }
 }
 
+/// In place of one motion a recipe may have several, of one body and tissue: their frames in the order of the recipe.
+#[test]
+fn a_network_learns_from_several_motions() {
+    let first = RECIPE.replace("[motion]", "[[motion]]");
+    let (table, rest) = first.split_once("[network]").unwrap();
+    let second = &table[table.find("[[motion]]").unwrap()..];
+    let several = |scene: &str| {
+        let second = second.replace("\"torsion\"", scene).replace("load = 0.02", "load = 1.0");
+        let recipe = Recipe::parse(&format!("{table}{second}[network]{rest}")).unwrap();
+        let scenes = recipe.motion.iter().map(|motion| training::scene(motion).unwrap()).collect::<Vec<_>>();
+        Samples::collect(&recipe, &[&scenes[0], &scenes[1]])
+    };
+    let (one, both) = (collected(RECIPE), several("\"stretch\"").unwrap());
+    assert_eq!(one, collected(&first));
+    assert_eq!((both.vertices, both.inputs.len()), (one.vertices, 2 * one.inputs.len()));
+    assert_eq!(both.of_frames(|frame| frame < 20), one);
+    assert!(both.of_frames(|frame| frame >= 20).inputs != one.inputs);
+    // Damped otherwise.
+    let said = several("\"sudden-torsion\"").unwrap_err().to_string();
+    println!("{said}");
+    assert!(said.starts_with("scene = \"sudden-torsion\": tissue, tetrahedra, damping, step or vertices are not"));
+    let said = Recipe::parse(&first.replace("to =", "too =")).unwrap_err().to_string();
+    assert!(said.contains("unknown field `too`"), "{said}");
+}
+
 #[test]
 fn turned_normals_change_no_length() {
     let smooth = collected(RECIPE);

@@ -6,6 +6,8 @@
 //! if its inertia were `l / Q(l)` times the true one.
 
 use supple::loads::Loads;
+use supple::material::{AnyLaw, Exponential};
+use supple::mesh::Bar;
 use supple::step::Step;
 use supple::tled;
 
@@ -19,7 +21,7 @@ fn body() -> Body {
 }
 
 /// The eigenvalues of `A` at rest in ascending order, 1/s^2: stiffness in float64 over the lumped mass of the free nodes.
-fn spectrum(body: &Body, law: supple::material::AnyLaw) -> Vec<f64> {
+fn spectrum(body: &Body, law: AnyLaw) -> Vec<f64> {
     let mesh = body.reference();
     let mass = mesh.lumped_mass(f64::from(DENSITY));
     let held: Vec<_> = held(body).iter().map(|support| support.node as usize).collect();
@@ -96,6 +98,20 @@ fn beyond_m_rings_and_one_inertia_grows_with_the_square_of_the_step() {
             assert!(true_up_to[0] <= true_up_to[1] * (1.0 + 1e-9) && true_up_to[1] < 1.02 * n as f64);
         }
     }
+}
+
+/// A step that weighs neighbours otherwise than by the forces between them reaches no further than its count for plane
+/// waves of compression along the bar, `2 sqrt(E / rho) / h` with the modulus `E` of uniaxial strain and cells of `h`.
+#[test]
+fn plane_waves_along_the_papers_bar_are_slower_than_its_highest_frequency() {
+    let AnyLaw::Exponential(Exponential { a, d, .. }) = EXP else { panic!("another law") };
+    let scene = Body::paper().scene(tissue(EXP), &[]);
+    let critical = tled::exact_critical_step(scene.view(), rest_of(&scene).displacements()).unwrap();
+    let modulus = 2.0 * f64::from(d) + 4.0 / 3.0 * f64::from(a);
+    let cell = f64::from(Bar::PAPER.size[2]) / f64::from(Bar::PAPER.cells[2]);
+    let of_waves = cell / (modulus / f64::from(DENSITY)).sqrt();
+    println!("critical step {:.1} us, that of plane waves {:.1} us", 1e6 * critical, 1e6 * of_waves);
+    assert!((1.0..2.0).contains(&(of_waves / critical)));
 }
 
 /// `m + 1` exact steps are such a filter: they see `m` rings beyond the force, node for node, and at the critical step
