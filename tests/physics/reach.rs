@@ -100,18 +100,25 @@ fn beyond_m_rings_and_one_inertia_grows_with_the_square_of_the_step() {
     }
 }
 
-/// A step that weighs neighbours otherwise than by the forces between them reaches no further than its count for plane
-/// waves of compression along the bar, `2 sqrt(E / rho) / h` with the modulus `E` of uniaxial strain and cells of `h`.
+/// A symmetric step that weighs neighbours otherwise than by the forces between them is bound by the same count for plane
+/// waves of compression along an axis of a regular mesh, whose critical step is `h / sqrt(E / rho)` with the modulus `E` of
+/// uniaxial strain and cells of `h`. So on the paper's bar it may reach further, but not by much.
 #[test]
-fn plane_waves_along_the_papers_bar_are_slower_than_its_highest_frequency() {
+fn plane_waves_in_the_papers_bar_have_a_longer_critical_step_than_the_bar() {
     let AnyLaw::Exponential(Exponential { a, d, .. }) = EXP else { panic!("another law") };
     let scene = Body::paper().scene(tissue(EXP), &[]);
     let critical = tled::exact_critical_step(scene.view(), rest_of(&scene).displacements()).unwrap();
     let modulus = 2.0 * f64::from(d) + 4.0 / 3.0 * f64::from(a);
-    let cell = f64::from(Bar::PAPER.size[2]) / f64::from(Bar::PAPER.cells[2]);
-    let of_waves = cell / (modulus / f64::from(DENSITY)).sqrt();
-    println!("critical step {:.1} us, that of plane waves {:.1} us", 1e6 * critical, 1e6 * of_waves);
-    assert!((1.0..2.0).contains(&(of_waves / critical)));
+    let of_waves = |axis: usize| {
+        let cell = f64::from(Bar::PAPER.size[axis]) / f64::from(Bar::PAPER.cells[axis]);
+        cell / (modulus / f64::from(DENSITY)).sqrt()
+    };
+    let [across, along] = [0, 2].map(|axis| of_waves(axis) / critical);
+    println!(
+        "critical step {:.1} us; that of plane waves across the bar {across:.2} times as long, along it {along:.2} times",
+        1e6 * critical
+    );
+    assert!([across, along].iter().all(|ratio| (1.0..1.7).contains(ratio)));
 }
 
 /// `m + 1` exact steps are such a filter: they see `m` rings beyond the force, node for node, and at the critical step
