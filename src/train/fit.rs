@@ -99,9 +99,8 @@ pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
 }
 
 /// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene, or of several that are
-/// alike but for their loads. With a folder for
-/// checkpoints the state is kept there after every epoch, and a training that was stopped goes on from it. `progress`
-/// may stop it.
+/// alike but for their loads. With a folder for checkpoints the state is kept there after every epoch, and a training
+/// that was stopped goes on from it. `progress` may stop it.
 pub fn fit(
     recipe: &Recipe,
     text: &str,

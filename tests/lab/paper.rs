@@ -34,7 +34,8 @@ fn the_exact_formula_fails_on_torsion_where_the_network_does_not() {
     }
 }
 
-/// How strongly a network answers to a force on a vertex at rest, over what the vertex's mass would do: mean of the three axes.
+/// How strongly a network answers to a force on a vertex at rest, over what the vertex's mass would do: mean of the
+/// three axes.
 fn gain(network: &Network<'_>, force: f32) -> f64 {
     let answer = |axis: usize, force: f32| {
         // Displacement, speed (that of a usual sample) and force over mass.
@@ -47,8 +48,9 @@ fn gain(network: &Network<'_>, force: f32) -> f64 {
     (0..3).map(|axis| (answer(axis, force) - answer(axis, -force)) / (2.0 * f64::from(force))).sum::<f64>() / 3.0
 }
 
-/// What sees one vertex and is linear has a gain of at most `1 / kappa^2` (docs/reach.md, tests/physics/reach.rs). The networks
-/// have true gain for small forces, as of smooth motion, and keep to the bound for large ones, as of rough motion.
+/// What sees one vertex and is linear has a gain of at most `1 / kappa^2` (docs/reach.md, tests/physics/reach.rs). The
+/// networks have true gain for small forces, as of smooth motion, and keep to the bound for large ones, as of rough
+/// motion.
 #[test]
 fn networks_answer_to_large_forces_with_a_gain_that_falls_as_the_square_of_the_step() {
     let spec = scenes::named("reversed").unwrap();
@@ -61,8 +63,8 @@ fn networks_answer_to_large_forces_with_a_gain_that_falls_as_the_square_of_the_s
         let (usual, bound) = (f64::from(network.inputs()[4].scale), kappa.powi(-2));
         let [small, large] = [0.25, 50.0].map(|force| gain(&network, force));
         println!(
-            "{multiple} times the paper's step, kappa {kappa:.2}: gain {small:.3} at 0.25 m/s^2 (usual in the training: {usual:.2}), \
-             {large:.4} at 50 m/s^2; 1 / kappa^2 = {bound:.4}"
+            "{multiple} times the paper's step, kappa {kappa:.2}: gain {small:.3} at 0.25 m/s^2 (usual in training: \
+             {usual:.2}), {large:.4} at 50 m/s^2; 1 / kappa^2 = {bound:.4}"
         );
         assert!((small - 1.0).abs() < 0.1, "not the true inertia");
         assert!((0.4..1.0).contains(&(large / bound)));

@@ -1,9 +1,9 @@
 //! How far a step can reach that sees only what is near a vertex (docs/reach.md), on a small bar of uneven tetrahedra.
 //!
-//! A step `u(t + D) = 2 u(t) - u(t - D) - D^2 Q(A) u(t)` with `A = M^-1/2 K M^-1/2` sees `m` rings beyond the force if `Q`
-//! is a polynomial of degree `n = m + 1`; `Q(A) = A` is the exact step. It leaves the rest shape alone if `Q(0) = 0`, and is
-//! stable if `T = 1 - D^2 Q / 2` stays between -1 and 1 on the spectrum. A mode of `A` with the eigenvalue `l` then moves as
-//! if its inertia were `l / Q(l)` times the true one.
+//! A step `u(t + D) = 2 u(t) - u(t - D) - D^2 Q(A) u(t)` with `A = M^-1/2 K M^-1/2` sees `m` rings beyond the force if
+//! `Q` is a polynomial of degree `n = m + 1`; `Q(A) = A` is the exact step. It leaves the rest shape alone if `Q(0) =
+//! 0`, and is stable if `T = 1 - D^2 Q / 2` stays between -1 and 1 on the spectrum. A mode of `A` with the eigenvalue
+//! `l` then moves as if its inertia were `l / Q(l)` times the true one.
 
 use supple::loads::Loads;
 use supple::material::{AnyLaw, Exponential};
@@ -20,7 +20,8 @@ fn body() -> Body {
     Body::irregular([0.02, 0.02, 0.04], [2, 2, 5])
 }
 
-/// The eigenvalues of `A` at rest in ascending order, 1/s^2: stiffness in float64 over the lumped mass of the free nodes.
+/// The eigenvalues of `A` at rest in ascending order, 1/s^2: stiffness in float64 over the lumped mass of the free
+/// nodes.
 fn spectrum(body: &Body, law: AnyLaw) -> Vec<f64> {
     let mesh = body.reference();
     let mass = mesh.lumped_mass(f64::from(DENSITY));
@@ -42,9 +43,9 @@ fn chebyshev(n: usize, x: f64) -> f64 {
     (n as f64 * x.clamp(-1.0, 1.0).acos()).cos()
 }
 
-/// The most by which any stable step of degree `n` can have `1 - T` at the lowest eigenvalue: `T` is the polynomial through
-/// its values at 0, where it is 1, and at `n` eigenvalues, where it is at least -1 and at most 1 (Lagrange). The eigenvalues
-/// are those nearest to where the Chebyshev polynomial is -1 or 1.
+/// The most by which any stable step of degree `n` can have `1 - T` at the lowest eigenvalue: `T` is the polynomial
+/// through its values at 0, where it is 1, and at `n` eigenvalues, where it is at least -1 and at most 1 (Lagrange).
+/// The eigenvalues are those nearest to where the Chebyshev polynomial is -1 or 1.
 fn most_of_any(n: usize, spectrum: &[f64]) -> f64 {
     let (lowest, highest) = (spectrum[0], spectrum[spectrum.len() - 1]);
     let nearest = |wanted: f64| {
@@ -59,8 +60,8 @@ fn most_of_any(n: usize, spectrum: &[f64]) -> f64 {
     1.0 - weight(0) + (1..=n).map(|k| weight(k).abs()).sum::<f64>()
 }
 
-/// The least inertia of the lowest mode over the true one, for steps that see 0 to 3 rings beyond the force: the Chebyshev
-/// filter has `(kappa / (m + 1))^2`, and no filter on this mesh has less.
+/// The least inertia of the lowest mode over the true one, for steps that see 0 to 3 rings beyond the force: the
+/// Chebyshev filter has `(kappa / (m + 1))^2`, and no filter on this mesh has less.
 #[test]
 fn beyond_m_rings_and_one_inertia_grows_with_the_square_of_the_step() {
     for (name, law) in [("neo-Hookean", NEO), ("the paper's law", EXP)] {
@@ -89,7 +90,7 @@ fn beyond_m_rings_and_one_inertia_grows_with_the_square_of_the_step() {
             let true_up_to = [attained, least].map(|inertia| inertia.sqrt().recip());
             let at = [5.0, 10.0, 20.0].map(|kappa| format!("{:.2}", (attained * kappa * kappa).max(1.0)));
             println!(
-                "  {m} rings: true inertia up to kappa {:.3} (no filter beyond {:.3}); at kappa 5, 10, 20 {} times the true one",
+                "  {m} rings: true inertia up to kappa {:.3} (no filter beyond {:.3}), {} times it at 5, 10, 20",
                 true_up_to[0],
                 true_up_to[1],
                 at.join(", ")
@@ -100,9 +101,9 @@ fn beyond_m_rings_and_one_inertia_grows_with_the_square_of_the_step() {
     }
 }
 
-/// A symmetric step that weighs neighbours otherwise than by the forces between them is bound by the same count for plane
-/// waves of compression along an axis of a regular mesh, whose critical step is `h / sqrt(E / rho)` with the modulus `E` of
-/// uniaxial strain and cells of `h`. So on the paper's bar it may reach further, but not by much.
+/// A symmetric step that weighs neighbours otherwise than by the forces between them is bound by the same count for
+/// plane waves of compression along an axis of a regular mesh, whose critical step is `h / sqrt(E / rho)` with the
+/// modulus `E` of uniaxial strain and cells of `h`. So on the paper's bar it may reach further, but not by much.
 #[test]
 fn plane_waves_in_the_papers_bar_have_a_longer_critical_step_than_the_bar() {
     let AnyLaw::Exponential(Exponential { a, d, .. }) = EXP else { panic!("another law") };
@@ -115,7 +116,7 @@ fn plane_waves_in_the_papers_bar_have_a_longer_critical_step_than_the_bar() {
     };
     let [across, along] = [0, 2].map(|axis| of_waves(axis) / critical);
     println!(
-        "critical step {:.1} us; that of plane waves across the bar {across:.2} times as long, along it {along:.2} times",
+        "critical step {:.1} us; that of plane waves {across:.2} times as long across the bar, {along:.2} along it",
         1e6 * critical
     );
     assert!([across, along].iter().all(|ratio| (1.0..1.7).contains(ratio)));
