@@ -48,8 +48,8 @@ held_out = 0.2
 
 fn samples() -> (Recipe, SceneSpec, Samples) {
     let recipe = Recipe::parse(RECIPE).unwrap();
-    let scene = training::scene(&recipe).unwrap();
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = training::scene(&recipe.motion[0]).unwrap();
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     (recipe, scene, samples)
 }
 
@@ -115,12 +115,12 @@ fn weights_say_where_they_come_from() {
 fn a_network_learns_from_any_scene_at_its_own_step() {
     let text = RECIPE.replace("\"torsion\"", "\"organ.toml\"").replace("load = 0.02", "load = 0.5");
     let recipe = Recipe::parse(&text).unwrap();
-    assert!(recipe.motion.is_file());
+    assert!(recipe.motion[0].is_file());
     let bar = named("stretch").unwrap();
     let timing = Timing { step: 5e-5, ..Timing::PAPER };
     let own = SceneSpec { element: Element::NodalPressure, damping: 7.0, density: 1_100.0, timing, ..bar };
-    let scene = own.with_load(recipe.motion.load);
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = own.with_load(recipe.motion[0].load);
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     assert_eq!(samples.inputs.len(), 20 * samples.vertices);
     let Fitted { bytes, .. } = fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(())).unwrap();
     let memory = WeightBytes::of(&bytes);
@@ -143,7 +143,7 @@ fn frames_are_spread_over_the_motion_at_every_step() {
     for multiple in [10, 20, 100] {
         let text = RECIPE.replace("multiple = 10", &format!("multiple = {multiple}"));
         let recipe = Recipe::parse(&text).unwrap();
-        let samples = Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap();
+        let samples = Samples::collect(&recipe, &[&training::scene(&recipe.motion[0]).unwrap()]).unwrap();
         assert_eq!(samples.inputs.len(), 20 * samples.vertices);
         assert_eq!(samples.targets.len(), samples.inputs.len());
         // The speed is that of the motion: it grows with the load, which is on a ramp.
@@ -190,7 +190,7 @@ fn a_recipe_that_cannot_be_used_says_why() {
     let said = |from: &str, to: &str| {
         assert!(RECIPE.contains(from));
         let recipe = Recipe::parse(&RECIPE.replace(from, to));
-        let said = recipe.and_then(|recipe| training::scene(&recipe)).unwrap_err().to_string();
+        let said = recipe.and_then(|recipe| training::scene(&recipe.motion[0])).unwrap_err().to_string();
         println!("{said}");
         said
     };
@@ -217,7 +217,7 @@ ease = 1.0
 
 fn collected(text: &str) -> Samples {
     let recipe = Recipe::parse(text).unwrap();
-    Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap()
+    Samples::collect(&recipe, &[&training::scene(&recipe.motion[0]).unwrap()]).unwrap()
 }
 
 #[test]
@@ -260,6 +260,31 @@ fn rough_motion_leads_back_to_the_exact_one() {
     }
 }
 
+/// In place of one motion a recipe may have several, of one body and tissue: their frames in the order of the recipe.
+#[test]
+fn a_network_learns_from_several_motions() {
+    let first = RECIPE.replace("[motion]", "[[motion]]");
+    let (table, rest) = first.split_once("[network]").unwrap();
+    let second = &table[table.find("[[motion]]").unwrap()..];
+    let several = |scene: &str| {
+        let second = second.replace("\"torsion\"", scene).replace("load = 0.02", "load = 1.0");
+        let recipe = Recipe::parse(&format!("{table}{second}[network]{rest}")).unwrap();
+        let scenes = recipe.motion.iter().map(|motion| training::scene(motion).unwrap()).collect::<Vec<_>>();
+        Samples::collect(&recipe, &[&scenes[0], &scenes[1]])
+    };
+    let (one, both) = (collected(RECIPE), several("\"stretch\"").unwrap());
+    assert_eq!(one, collected(&first));
+    assert_eq!((both.vertices, both.inputs.len()), (one.vertices, 2 * one.inputs.len()));
+    assert_eq!(both.of_frames(|frame| frame < 20), one);
+    assert!(both.of_frames(|frame| frame >= 20).inputs != one.inputs);
+    // Damped otherwise.
+    let said = several("\"sudden-torsion\"").unwrap_err().to_string();
+    println!("{said}");
+    assert!(said.starts_with("scene = \"sudden-torsion\": tissue, tetrahedra, damping, step or vertices are not"));
+    let said = Recipe::parse(&first.replace("to =", "too =")).unwrap_err().to_string();
+    assert!(said.contains("unknown field `too`"), "{said}");
+}
+
 #[test]
 fn turned_normals_change_no_length() {
     let smooth = collected(RECIPE);
@@ -280,17 +305,17 @@ fn vertices_loaded_alone_are_left_out_and_those_of_a_loaded_surface_are_not() {
     let free = scene.points.len() - scene.supports.len();
     assert_eq!(samples.vertices, free - scene.forces.len(), "four corners of the bar");
     let recipe = Recipe::parse(&RECIPE.replace("torsion", "cylinder")).unwrap();
-    let scene = training::scene(&recipe).unwrap();
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let scene = training::scene(&recipe.motion[0]).unwrap();
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     assert_eq!(samples.vertices, scene.points.len() - scene.supports.len(), "all of the cylinder is loaded");
 }
 
 #[test]
 fn a_motion_of_which_every_vertex_is_held_leaves_nothing_to_learn() {
     let recipe = Recipe::parse(RECIPE).unwrap();
-    let mut scene = training::scene(&recipe).unwrap();
+    let mut scene = training::scene(&recipe.motion[0]).unwrap();
     scene.supports = (0..scene.points.len() as u32).map(Support::fixed).collect();
-    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let samples = Samples::collect(&recipe, &[&scene]).unwrap();
     let fitted = fit(&recipe, RECIPE, &scene, &samples, None, &mut |_| ControlFlow::Continue(()));
     let said = fitted.unwrap_err().to_string();
     assert!(said.starts_with("scene = \"torsion\": every vertex is held, or loaded alone"), "{said}");

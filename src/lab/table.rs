@@ -33,14 +33,18 @@ const COLUMNS: [Column; 16] = [
     ("hold_at_end_mm", |row| length(Some(row.hold_at_end))),
 ];
 
-/// Of the text: those that matter most to people.
-const TEXT_COLUMNS: [Column; 9] = [
+/// Of the text: those that matter most to people. `kappa` is the step over the critical one, at rest and where that is
+/// least along the motion.
+const TEXT_COLUMNS: [Column; 12] = [
     ("scene", |row| row.scene.into()),
     ("method", |row| row.method.name().into()),
     ("multiple", |row| format!("{}", row.multiple)),
+    ("kappa rest", |row| format!("{:.2}", row.step_over_limit_rest)),
+    ("kappa most", |row| format!("{:.2}", row.step_over_limit_trajectory)),
     ("mean mm", |row| short(error(row, Errors::mean))),
     ("max mm", |row| short(error(row, |errors| errors.max))),
     ("over time mm", |row| short(error(row, Errors::mean_over_time))),
+    ("hold mm", |row| short(Some(row.hold))),
     ("skill", |row| short(skill(row))),
     ("us/step", |row| row.figures().map_or_else(|| "-".into(), |figures| format!("{:.1}", figures.us_per_step))),
     ("status", |row| format!("{}", row.end)),
@@ -93,7 +97,7 @@ pub fn text(rows: &[Row]) -> String {
             // Words to the left, figures to the right.
             text += &match column {
                 0 | 1 => format!("{cell:<width$}  "),
-                8 => format!("{cell}\n"),
+                last if last + 1 == TEXT_COLUMNS.len() => format!("{cell}\n"),
                 _ => format!("{cell:>width$}  "),
             };
         }

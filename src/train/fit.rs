@@ -98,9 +98,9 @@ pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
     ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
 }
 
-/// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene. With a folder for
-/// checkpoints the state is kept there after every epoch, and a training that was stopped goes on from it. `progress`
-/// may stop it.
+/// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene, or of several that are
+/// alike but for their loads. With a folder for checkpoints the state is kept there after every epoch, and a training
+/// that was stopped goes on from it. `progress` may stop it.
 pub fn fit(
     recipe: &Recipe,
     text: &str,
@@ -110,8 +110,9 @@ pub fn fit(
     progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Fitted, TrainError> {
     if samples.inputs.is_empty() {
-        let scene = &recipe.motion.scene;
-        let text = format!("scene = {scene:?}: every vertex is held, or loaded alone, none is left to learn from");
+        let scenes: Vec<&str> = recipe.motion.iter().map(|motion| motion.scene.as_str()).collect();
+        let text =
+            format!("scene = {:?}: every vertex is held, or loaded alone, none is left to learn from", scenes.join(", "));
         return Err(TrainError::Recipe(text));
     }
     let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();

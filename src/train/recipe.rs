@@ -4,7 +4,7 @@
 //! seed = 1
 //! multiple = 10            # step of the network over the exact one's: 30 us in the laboratory's scenes
 //!
-//! [motion]
+//! [motion]                 # or [[motion]] for each of several, of one body
 //! scene = "torsion"        # of the laboratory; the command takes a scene file too: "organ.toml", from the folder of the recipe
 //! element = "linear"       # or "nodal-pressure", "nodal-strain"; may be left out: the scene's
 //! load = 1.0               # times the scene's forces
@@ -41,6 +41,8 @@ use std::string::{String, ToString};
 use std::vec::Vec;
 
 use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::TrainError;
 use crate::material::Element;
@@ -54,8 +56,9 @@ pub struct Recipe {
     pub seed: u64,
     /// Step of the network over that of the exact step, [`super::TrainingScene::step`].
     pub multiple: u32,
-    /// What is learned from.
-    pub motion: MotionRecipe,
+    /// What is learned from: one motion or several.
+    #[serde(deserialize_with = "one_or_several")]
+    pub motion: Vec<MotionRecipe>,
     /// Rough motion to learn from as well.
     #[serde(default)]
     pub noise: Option<Noise>,
@@ -165,6 +168,42 @@ impl MotionRecipe {
     pub fn is_file(&self) -> bool {
         self.scene.ends_with(".toml")
     }
+
+    fn checked(&self) -> Result<(), TrainError> {
+        let Self { from, to, load, frames, .. } = *self;
+        let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
+        if !(from >= 0.0 && to > from && to <= 10.0) {
+            return refuse("from", &format!("{from} to {to}"), "they must rise, from zero to ten seconds");
+        }
+        if !(load.is_finite() && load != 0.0) {
+            return refuse("load", &load, "it must be a number other than zero");
+        }
+        if frames == 0 || frames > 100_000 {
+            return refuse("frames", &frames, "it must be from 1 to 100000");
+        }
+        Ok(())
+    }
+}
+
+/// A table, or an array of tables.
+fn one_or_several<'de, D: Deserializer<'de>>(motion: D) -> Result<Vec<MotionRecipe>, D::Error> {
+    struct Motions;
+    impl<'de> Visitor<'de> for Motions {
+        type Value = Vec<MotionRecipe>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a motion or several")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, one: A) -> Result<Self::Value, A::Error> {
+            MotionRecipe::deserialize(MapAccessDeserializer::new(one)).map(|motion| std::vec![motion])
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, several: A) -> Result<Self::Value, A::Error> {
+            Vec::deserialize(SeqAccessDeserializer::new(several))
+        }
+    }
+    motion.deserialize_any(Motions)
 }
 
 impl Recipe {
@@ -180,16 +219,10 @@ impl Recipe {
         if !(1..=1_000).contains(multiple) {
             return refuse("multiple", multiple, "it must be from 1 to 1000");
         }
-        if !(motion.from >= 0.0 && motion.to > motion.from && motion.to <= 10.0) {
-            let span = format!("{} to {}", motion.from, motion.to);
-            return refuse("from", &span, "they must rise, from zero to ten seconds");
+        if !(1..=100).contains(&motion.len()) {
+            return refuse("motions", &motion.len(), "from 1 to 100");
         }
-        if !(motion.load.is_finite() && motion.load != 0.0) {
-            return refuse("load", &motion.load, "it must be a number other than zero");
-        }
-        if motion.frames == 0 || motion.frames > 100_000 {
-            return refuse("frames", &motion.frames, "it must be from 1 to 100000");
-        }
+        motion.iter().try_for_each(MotionRecipe::checked)?;
         if let Some(noise) = noise
             && !noise.usable()
         {

@@ -21,7 +21,7 @@ use glam::{DVec3, Vec3A};
 
 use super::noise::{Moment, MovedCopy, SeenAs};
 use super::random_numbers::Random;
-use super::recipe::Recipe;
+use super::recipe::{MotionRecipe, Recipe};
 use super::{TrainError, TrainingScene};
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, PREDICTED};
@@ -57,9 +57,31 @@ pub struct Rough {
 }
 
 impl Samples {
-    /// Simulates the recipe's motion, that of `scene`, and samples it.
-    pub fn collect(recipe: &Recipe, scene: &dyn TrainingScene) -> Result<Self, TrainError> {
-        collect(scene, recipe)
+    /// Simulates the recipe's motions, those of `scenes`, and samples them: motions of one body, sampled at as many
+    /// vertices.
+    pub fn collect(recipe: &Recipe, scenes: &[&dyn TrainingScene]) -> Result<Self, TrainError> {
+        let facts = |scene: &dyn TrainingScene| (scene.tissue(), scene.element(), scene.damping(), scene.step());
+        let mut all = Self::default();
+        for (number, (motion, scene)) in recipe.motion.iter().zip(scenes).enumerate() {
+            let seed = recipe.seed.wrapping_add(number as u64);
+            let one = collect(*scene, recipe, motion, &mut Random(seed))?;
+            if number > 0 && (facts(*scene) != facts(scenes[0]) || one.vertices != all.vertices) {
+                let must = "tissue, tetrahedra, damping, step or vertices are not those of the first motion";
+                return Err(TrainError::refused("scene", format!("{:?}", motion.scene), must));
+            }
+            all.add(one);
+        }
+        Ok(all)
+    }
+
+    /// Further frames of as many vertices.
+    fn add(&mut self, more: Self) {
+        self.inputs.extend(more.inputs);
+        self.targets.extend(more.targets);
+        self.vertices = more.vertices;
+        self.rough.inputs.extend(more.rough.inputs);
+        self.rough.targets.extend(more.rough.targets);
+        self.rough.weights.extend(more.rough.weights);
     }
 
     /// Those of some frames.
@@ -153,9 +175,8 @@ struct Schedule {
 }
 
 impl Schedule {
-    fn of(recipe: &Recipe, dt: f64) -> Self {
-        let motion = &recipe.motion;
-        let every = u64::from(recipe.multiple);
+    fn of(motion: &MotionRecipe, multiple: u32, dt: f64) -> Self {
+        let every = u64::from(multiple);
         let span = motion.to - motion.from;
         let long = every as f64 * dt;
         Self {
@@ -199,7 +220,12 @@ fn free_and_sampled(exemplar: &dyn TrainingScene, scene: SceneView<'_, VecMateri
     (held.into_iter().map(|held| !held).collect(), sampled)
 }
 
-fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, TrainError> {
+fn collect(
+    exemplar: &dyn TrainingScene,
+    recipe: &Recipe,
+    motion: &MotionRecipe,
+    random: &mut Random,
+) -> Result<Samples, TrainError> {
     let scene = exemplar.build()?;
     let (seconds, dt) = (exemplar.step(), f64::from(exemplar.step()));
     let step = Step::unchecked(seconds, exemplar.damping());
@@ -207,11 +233,10 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
     let nodes = scene.node_count();
     let mut state = VecState::at_rest(nodes);
     let (free, sampled) = free_and_sampled(exemplar, scene.view());
-    let mut random = Random(recipe.seed);
     let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
     let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
 
-    let schedule = Schedule::of(recipe, dt);
+    let schedule = Schedule::of(motion, recipe.multiple, dt);
     let Schedule { every, sequences: count, last, .. } = schedule;
     let long = every as f64 * dt;
     let mut sequences: Vec<Sequence> = (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
@@ -247,7 +272,7 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
             };
             let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
                 let moment = sequences[at].moment(before, &free, long, seen_as);
-                let copy = |_| moment.moved(noise, &sampled, &mut random, forces_of);
+                let copy = |_| moment.moved(noise, &sampled, random, forces_of);
                 (0..noise.copies).map(copy).collect::<Vec<_>>()
             });
             let copies = copies.collect();
@@ -258,8 +283,8 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
             *place += Vec3A::from(increment.to_array()).as_dvec3();
         }
     }
-    if recipe.motion.turned {
-        samples.turn_normals(&mut random);
+    if motion.turned {
+        samples.turn_normals(random);
     }
     Ok(samples)
 }

@@ -1,6 +1,6 @@
 //! Damaged recipes for training: a recipe is refused with a reason, or its numbers are in their ranges.
 
-use supple::train::recipe::Recipe;
+use supple::train::recipe::{MotionRecipe, Recipe};
 use supple_lab::training::damper;
 
 use crate::hostile::{Changes, Run, measured};
@@ -18,6 +18,7 @@ fn recipes() {
         b"[noise]\n",
         b"copies = 1\n",
         b"[[a]]\n",
+        b"[[motion]]\n",
         b"\"\"\"",
         b"[",
         b"{a=",
@@ -34,7 +35,8 @@ fn recipes() {
             assert!(error.to_string().len() > 4, "{error:?}");
         }
         if let Ok(recipe) = &recipe {
-            assert!(recipe.motion.frames > 0 && recipe.motion.to.is_finite() && recipe.training.rate.is_finite());
+            let usable = |motion: &MotionRecipe| motion.frames > 0 && motion.to.is_finite();
+            assert!(!recipe.motion.is_empty() && recipe.motion.iter().all(usable) && recipe.training.rate.is_finite());
         }
         recipe.is_ok() || damper.is_ok()
     });

@@ -20,6 +20,7 @@ mod nodal_elements;
 mod nodal_pressure;
 mod nodal_strain;
 mod patch;
+mod reach;
 mod reference_self;
 mod relaxation;
 mod stability;

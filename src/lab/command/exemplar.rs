@@ -1,4 +1,4 @@
-//! The scene whose motion a network learns from: one of the laboratory's, or a scene file's.
+//! The scenes whose motions a network learns from: each one of the laboratory's, or a scene file's.
 
 use std::path::Path;
 
@@ -6,7 +6,8 @@ use supple::loads::{LoadsOverTime, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{Support, VecScene};
 use supple::tled;
-use supple::train::recipe::Recipe;
+use supple::train::recipe::{MotionRecipe, Recipe};
+use supple::train::samples::Samples;
 use supple::train::{TrainError, TrainingScene};
 use supple_cli::problem::Problem;
 use supple_cli::scene::file::SceneFile;
@@ -19,11 +20,18 @@ use supple_lab::training;
 /// deforms, and the steps of one training are all alike.
 const SHARE: f32 = 0.5;
 
-/// The scene of a recipe, which is found in the folder of `file`.
-pub(super) fn learned_from(recipe: &Recipe, file: &Path) -> Result<Box<dyn TrainingScene>, Problem> {
-    let motion = &recipe.motion;
+/// The samples of a recipe, and the scene of its first motion. Scene files are found in the folder of `file`.
+pub(super) fn learned_from(recipe: &Recipe, file: &Path) -> Result<(Box<dyn TrainingScene>, Samples), Problem> {
+    let scenes = recipe.motion.iter().map(|motion| scene_of(motion, file)).collect::<Result<Vec<_>, _>>()?;
+    let all: Vec<&dyn TrainingScene> = scenes.iter().map(|scene| &**scene).collect();
+    let samples = Samples::collect(recipe, &all).map_err(|error| Problem::in_file(file, error))?;
+    let first = scenes.into_iter().next().ok_or_else(|| Problem::in_file(file, "no motion"))?;
+    Ok((first, samples))
+}
+
+fn scene_of(motion: &MotionRecipe, file: &Path) -> Result<Box<dyn TrainingScene>, Problem> {
     if !motion.is_file() {
-        let scene = training::scene(recipe).map_err(|error| Problem::in_file(file, error))?;
+        let scene = training::scene(motion).map_err(|error| Problem::in_file(file, error))?;
         return Ok(Box::new(scene));
     }
     let path = file.parent().unwrap_or(Path::new("")).join(&motion.scene);

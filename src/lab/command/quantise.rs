@@ -38,8 +38,7 @@ pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
         return Err(Problem::in_file(path, format!("--float {layer}, but there are {count} layers")));
     }
     message!("simulating the motion it learned from ...");
-    let scene = learned_from(&recipe, path)?;
-    let samples = Samples::collect(&recipe, &*scene).map_err(|error| Problem::in_file(path, error))?;
+    let (_, samples) = learned_from(&recipe, path)?;
     let float = if float.is_empty() { usual_float_layers(&network) } else { float.clone() };
     let made = int8(&network, &recipe, &samples, &float).map_err(|error| Problem::in_file(path, error))?;
     tell(&made, out)?;

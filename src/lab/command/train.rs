@@ -8,7 +8,6 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use supple::train::fit::{Fitted, Progress, fit};
 use supple::train::recipe::Recipe;
-use supple::train::samples::Samples;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output};
 use supple_cli::weight_file;
@@ -43,8 +42,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let parsed = Recipe::parse(&text).map_err(|error| problem(&error))?;
     let folder = checkpoints(out);
     message!("simulating the motion to learn from ...");
-    let scene = learned_from(&parsed, recipe)?;
-    let collected = Samples::collect(&parsed, &*scene).map_err(|error| problem(&error))?;
+    let (scene, collected) = learned_from(&parsed, recipe)?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
     bar.set_style(style);

@@ -6,7 +6,7 @@ pub mod damper;
 use supple::loads::{LoadsOverTime, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{Support, VecScene};
-use supple::train::recipe::Recipe;
+use supple::train::recipe::MotionRecipe;
 use supple::train::{TrainError, TrainingScene};
 
 use super::LabError;
@@ -52,9 +52,8 @@ impl TrainingScene for SceneSpec {
     }
 }
 
-/// The scene that a recipe names, one of [`scenes::RAMPED`], with the load and the tetrahedra that it asks for.
-pub fn scene(recipe: &Recipe) -> Result<SceneSpec, TrainError> {
-    let motion = &recipe.motion;
+/// The scene that a recipe's motion names, one of [`scenes::RAMPED`], with the load and the tetrahedra that it asks for.
+pub fn scene(motion: &MotionRecipe) -> Result<SceneSpec, TrainError> {
     if !scenes::RAMPED.contains(&motion.scene.as_str()) {
         let must = format!("there are {}, and scene files, NAME.toml", scenes::RAMPED.join(", "));
         return Err(TrainError::refused("scene", format!("{:?}", motion.scene), &must));
