@@ -190,16 +190,17 @@ impl<'a> Fibrous<'a> {
             }
             return terms;
         }
-        let mut rows = [[[0.0; 2]; FIBRE_TERMS]; TILE];
-        for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
-            *row = self.of(element(lane)).terms();
+        let mut rows = [[[0.0; TILE]; 2]; FIBRE_TERMS];
+        for lane in 0..R::COUNT {
+            for (rows, constants) in rows.iter_mut().zip(self.of(element(lane)).terms()) {
+                for (row, constant) in rows.iter_mut().zip(constants) {
+                    row[lane % TILE] = constant;
+                }
+            }
         }
-        unrolled!(term < FIBRE_TERMS => {
-            terms[term] = FibreTerm {
-                a: R::from_fn(|lane| rows[lane % TILE][term][0]),
-                b: R::from_fn(|lane| rows[lane % TILE][term][1]),
-            };
-        });
+        for (term, [a, b]) in terms.iter_mut().zip(&rows) {
+            *term = FibreTerm { a: vector_at(a, 0), b: vector_at(b, 0) };
+        }
         terms
     }
 

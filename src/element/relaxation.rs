@@ -101,28 +101,32 @@ impl<'a> Relaxing<'a> {
         Self { series, alike, listed, part, table: table.as_ptr().addr(), before, after, own }
     }
 
-    /// The tissues of a vector of elements.
+    /// Numbers of the tissues of a vector of elements.
     #[inline(always)]
-    fn tissues<R: Real>(&self, element: impl Fn(usize) -> usize) -> [usize; TILE] {
-        let mut tissues = [0; TILE];
-        if !self.alike {
-            for (lane, tissue) in tissues.iter_mut().enumerate().take(R::COUNT) {
-                *tissue = self.series.tissue(element(lane));
+    fn numbers<R: Real, const N: usize>(
+        &self,
+        element: impl Fn(usize) -> usize,
+        of: impl Fn(&OfTissue) -> [f32; N],
+    ) -> [R; N] {
+        if self.alike {
+            return of(&self.listed[0]).map(R::splat);
+        }
+        let mut rows = [[0.0; TILE]; N];
+        for lane in 0..R::COUNT {
+            let tissue = self.series.tissue(element(lane));
+            let numbers = match self.listed.get(tissue) {
+                Some(listed) => of(listed),
+                None => of(&self.not_listed(tissue)),
+            };
+            for (row, number) in rows.iter_mut().zip(numbers) {
+                row[lane % TILE] = number;
             }
         }
-        tissues
-    }
-
-    /// A number of each of these tissues.
-    #[inline(always)]
-    fn gathered<R: Real>(&self, tissues: &[usize; TILE], number: impl Fn(&OfTissue) -> f32) -> R {
-        if self.alike {
-            return R::splat(number(&self.listed[0]));
+        let mut vectors = [R::splat(0.0); N];
+        for (vector, row) in vectors.iter_mut().zip(&rows) {
+            *vector = vector_at(row, 0);
         }
-        R::from_fn(|lane| match self.listed.get(tissues[lane % TILE]) {
-            Some(of) => number(of),
-            None => number(&self.not_listed(tissues[lane % TILE])),
-        })
+        vectors
     }
 
     #[cold]
@@ -236,10 +240,8 @@ impl Relaxing<'_> {
         let tile = place_of(self.table, tile);
         let (part, terms) = (R::splat(self.part), self.series.terms.min(MOST_TERMS));
         let mut sum = [R::splat(0.0); COMPONENTS];
-        let tissues = self.tissues::<R>(element);
         for term in 0..terms {
-            let [share, at_step, over_step] =
-                [0, 1, 2].map(|number| self.gathered::<R>(&tissues, |of| of.terms[term % MOST_TERMS][number % 3]));
+            let [share, at_step, over_step] = self.numbers::<R, 3>(&element, |of| of.terms[term % MOST_TERMS]);
             let rows = COMPONENTS * (terms * tile + term);
             let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
             let own = rows.wrapping_sub(COMPONENTS * terms * self.own);
@@ -268,7 +270,8 @@ impl Relaxing<'_> {
     /// is never negative.
     #[inline(always)]
     pub(super) fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
-        modulus * self.gathered::<R>(&self.tissues::<R>(element), |of| of.stabilising)
+        let [share] = self.numbers::<R, 1>(element, |of| [of.stabilising]);
+        modulus * share
     }
 
     /// With `q = -J^(-2/3) sum_i Q_i` the stress is `p1 (F - N) + (s - C:q / (3 J)) N + F q`. Every product below is small

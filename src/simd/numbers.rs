@@ -1,5 +1,7 @@
 //! Scatter of one number for each node, as [`super::vectors`] scatters vectors, and in the same order.
 
+use core::ops::Range;
+
 use super::vectors::SCATTER_WIDTH;
 use super::{Real, TILE, TileNodes};
 
@@ -86,12 +88,24 @@ impl<'a> ScatterNumbers<'a> {
         first: usize,
         values: [R; N],
     ) {
-        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
-            for (nodes, value) in nodes.iter().zip(&values) {
-                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
-                    let node = nodes[(first + lane) % TILE] as usize;
+        let mut rows = [[0.0; TILE]; N];
+        for (row, value) in rows.iter_mut().zip(values) {
+            for lane in 0..R::COUNT {
+                row[lane % TILE] = value.lane(lane);
+            }
+        }
+        self.add_rows(&nodes, first..first + R::COUNT, &rows);
+    }
+
+    /// The numbers of each corner, one for each of these places. Compiled once, not for each kernel and width.
+    #[inline(never)]
+    fn add_rows(&mut self, nodes: &[&[u32; TILE]], places: Range<usize>, rows: &[[f32; TILE]]) {
+        for start in places.clone().step_by(SCATTER_WIDTH) {
+            for (nodes, row) in nodes.iter().zip(rows) {
+                for place in start..places.end.min(start + SCATTER_WIDTH) {
+                    let node = nodes[place % TILE] as usize;
                     if let Some(number) = self.numbers.get_mut(node.wrapping_sub(self.first)) {
-                        *number += value.lane(lane);
+                        *number += row[(place - places.start) % TILE];
                     }
                 }
             }

@@ -2,6 +2,8 @@
 //! the vectors of several nodes into one SIMD vector per axis. Scatter adds SIMD vectors to the vectors of their nodes,
 //! in an order that does not depend on the width.
 
+use core::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 
 use super::{Real, TILE};
@@ -332,13 +334,23 @@ impl<'a> Scatter<'a> {
         first: usize,
         values: [[R; 4]; N],
     ) {
-        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
-            for (nodes, values) in nodes.iter().zip(&values) {
-                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
-                    let node = nodes[(first + lane) % TILE] as usize;
+        let mut rows = [[[0.0; 4]; TILE]; N];
+        for (rows, values) in rows.iter_mut().zip(values) {
+            R::to_rows(values, |lane, row| rows[lane % TILE] = row);
+        }
+        self.add_rows(&nodes, first..first + R::COUNT, &rows);
+    }
+
+    /// The rows of each corner, one for each of these places. Compiled once, not for each kernel and width.
+    #[inline(never)]
+    fn add_rows(&mut self, nodes: &[&[u32; TILE]], places: Range<usize>, rows: &[[[f32; 4]; TILE]]) {
+        for start in places.clone().step_by(SCATTER_WIDTH) {
+            for (nodes, rows) in nodes.iter().zip(rows) {
+                for place in start..places.end.min(start + SCATTER_WIDTH) {
+                    let node = nodes[place % TILE] as usize;
                     if let Some(vector) = self.vectors.get_mut(node.wrapping_sub(self.first)) {
-                        for (sum, value) in vector.0.iter_mut().zip(values) {
-                            *sum += value.lane(lane);
+                        for (sum, value) in vector.0.iter_mut().zip(rows[(place - places.start) % TILE]) {
+                            *sum += value;
                         }
                     }
                 }

@@ -111,8 +111,10 @@ pub fn fit(
 ) -> Result<Fitted, TrainError> {
     if samples.inputs.is_empty() {
         let scenes: Vec<&str> = recipe.motion.iter().map(|motion| motion.scene.as_str()).collect();
-        let text =
-            format!("scene = {:?}: every vertex is held, or loaded alone, none is left to learn from", scenes.join(", "));
+        let text = format!(
+            "scene = {:?}: every vertex is held, or loaded alone, none is left to learn from",
+            scenes.join(", ")
+        );
         return Err(TrainError::Recipe(text));
     }
     let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();
