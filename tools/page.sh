@@ -8,8 +8,7 @@
 # The page is out/page/index.html; screenshots and figures of the tests come next to it. The package is out/npm/supple-kernel-VERSION.tgz.
 # --build only builds, --package builds and tests the package alone. What it needs comes from Debian (node, chromium), from npm (pinned
 # in package-lock.json of both folders) and, for the compiler, from `tools/cross.sh --install`.
-# Building takes two minutes, nearly all for the kernel, the tests take three and a half; for the comparison with the native kernel they
-# need the command, which is built as well.
+# The page has its liver from the command, `supple liver`, and the tests compare with it: it is built as well.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -40,13 +39,15 @@ if [ "${1:-}" != --build ]; then
 fi
 [ "${1:-}" != --package ] || exit 0
 
+cargo build --quiet --release
 npm ci --prefix examples/page --no-audit --no-fund --silent
 mkdir -p out/page
-node examples/page/build.mjs "$library" out/page/index.html
+target/release/supple liver >out/page/liver.json
+node examples/page/build.mjs "$library" out/page/liver.json out/page/index.html
 printf 'out/page/index.html  %s bytes\n%s  %s bytes, %s compressed\n' "$(stat -c %s out/page/index.html)" \
     "$library" "$(stat -c %s "$library")" "$(gzip -9 -c "$library" | wc -c)"
 [ "${1:-}" != --build ] || exit 0
 
-cargo build --quiet --release
-SUPPLE_WASM=$library SUPPLE_COMMAND=target/release/supple node --test --test-reporter=spec tests/page/kernel.test.mjs
+SUPPLE_WASM=$library SUPPLE_LIVER=$PWD/out/page/liver.json SUPPLE_COMMAND=target/release/supple \
+    node --test --test-reporter=spec tests/page/kernel.test.mjs
 SUPPLE_PAGE=$PWD/out/page/index.html node --test --test-reporter=spec tests/page/browser.test.mjs

@@ -32,11 +32,11 @@ const lab = await open(join(runs, "lab", "report.html"), 1100);
 await figure(lab, "Speed", ".panels", "speed");
 await figure(lab, "The paper's bar", ".panels", "bars");
 
-// The page while a ball presses the lobe.
+// The page while the liver breathes and a ball presses it.
 const page = await open("out/page/index.html", 1100);
 await page.waitForFunction(() => window.supple?.latest?.number > 3, { timeout: 60_000, polling: 20 });
 await page.click("label:has(input[value=press])");
-const dome = await page.evaluate(() => window.supple.pixel([-0.01, 0.004, 0.0605]));
+const dome = await page.evaluate(() => window.supple.pixel([0.0266, -0.0144, 0.0289]));
 await page.mouse.move(dome.x, dome.y);
 await page.mouse.down();
 await page.mouse.move(dome.x + 30, dome.y + 10, { steps: 10 });

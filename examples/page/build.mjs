@@ -1,5 +1,6 @@
-// Makes the page: one HTML file with the kernel, the lobe, three.js and the style in it, so that it works from any folder or server.
-//     node build.mjs LIBRARY.wasm OUT.html
+// Makes the page: one HTML file with the kernel, the liver, three.js and the style in it, so that it works from any
+// folder or server.
+//     node build.mjs LIBRARY.wasm LIVER.json OUT.html
 
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -10,10 +11,9 @@ import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
 import { readHeader } from "../../src/javascript/header.mjs";
-import { readMesh } from "../../src/javascript/mesh.js";
 
-const [wasm, out] = process.argv.slice(2);
-if (!out) throw new Error("node build.mjs LIBRARY.wasm OUT.html");
+const [wasm, liver, out] = process.argv.slice(2);
+if (!out) throw new Error("node build.mjs LIBRARY.wasm LIVER.json OUT.html");
 const here = fileURLToPath(new URL(".", import.meta.url));
 const read = (path, ...options) => readFileSync(join(here, path), ...options);
 const built = mkdtempSync(join(tmpdir(), "supple-page-"));
@@ -22,23 +22,30 @@ const put = (name, contents) => writeFileSync(join(built, name), contents);
 /** What the page imports as "built:NAME". */
 const fromBuilt = {
     name: "built",
-    setup: ({ onResolve }) => onResolve({ filter: /^built:/ }, ({ path }) => ({ path: join(built, path.slice("built:".length)) })),
+    setup: ({ onResolve }) =>
+        onResolve({ filter: /^built:/ }, ({ path }) => ({ path: join(built, path.slice("built:".length)) })),
 };
 async function bundle(entry) {
-    const { outputFiles: [{ text }] } = await build({
-        entryPoints: [join(here, entry)], bundle: true, minify: true, write: false, format: "iife", target: "es2022", charset: "utf8",
-        legalComments: "inline", plugins: [fromBuilt],
-        loader: { ".gz": "binary" }, logLevel: "warning" });
+    const {
+        outputFiles: [{ text }],
+    } = await build({
+        entryPoints: [join(here, entry)],
+        bundle: true,
+        minify: true,
+        write: false,
+        format: "iife",
+        target: "es2022",
+        charset: "utf8",
+        legalComments: "inline",
+        plugins: [fromBuilt],
+        loader: { ".gz": "binary" },
+        logLevel: "warning",
+    });
     return text;
 }
 
 try {
-    const mesh = readMesh(read("../../meshes/lobe.msh", "utf8"), "meshes/lobe.msh");
-    const plain = ({ points, ...corners }) => ({
-        points: Array.from(points, (metre) => Number(metre.toFixed(7))),
-        ...Object.fromEntries(Object.entries(corners).map(([name, nodes]) => [name, [...nodes]])),
-    });
-    put("lobe.json", JSON.stringify(plain(mesh)));
+    put("liver.json", readFileSync(liver));
     put("header.json", JSON.stringify(readHeader(read("../../include/supple.h", "utf8"))));
     put("supple.wasm.gz", gzipSync(readFileSync(wasm), { level: 9 }));
     put("worker.txt", await bundle("worker.js"));

@@ -1,10 +1,12 @@
-// The page: asks the kernel for a frame, shows it, hands it what the pointer does. A frame of the kernel is a sixtieth of a second; where
-// it takes longer than that, time goes slower, and the page says so.
+// The page: asks the kernel for a frame, shows it, hands it what pointer and keys do. A frame of the kernel is a
+// sixtieth of a second; where it takes longer than that, time goes slower, and the page says so.
 
 import source from "built:worker.txt";
 
+import { Hand } from "./hand.js";
+import { listenToKeys } from "./keys.js";
 import { Panel } from "./panel.js";
-import { listen } from "./pointer.js";
+import { listenToPointer } from "./pointer.js";
 import { View } from "./view.js";
 
 const FRAME = 1000 / 60; // ms
@@ -16,31 +18,35 @@ let stopped = false;
 let due = 0; // when the next frame is, ms
 const counts = { since: 0, drawn: 0, simulated: 0 };
 /** For tests and for the console. */
-const supple = {
-    latest: null, pace: null, send,
-    pixel: (point) => view.pixel(point),
-    paint: () => view.paint(),
-};
+const supple = { latest: null, pace: null, send, pixel: (point) => view.pixel(point), paint: () => view.paint() };
 window.supple = supple;
 
 const answers = {
-    ready({ lobe, milliseconds }) {
-        view = new View(document.getElementById("canvas"), lobe);
-        listen(view, () => panel.kind(), (message) => {
-            if (message.type === "begin") panel.say(null);
-            send(message);
-        });
+    ready({ liver, milliseconds }) {
+        const canvas = document.getElementById("canvas");
+        view = new View(canvas, liver);
+        const hand = new Hand(
+            view,
+            () => panel.kind(),
+            (message) => {
+                if (message.type === "begin") panel.say(null);
+                send(message);
+            },
+        );
+        listenToPointer(canvas, hand, view);
+        listenToKeys(canvas, document.getElementById("cross"), hand, view, (text) => panel.say(text));
+        panel.begin(liver);
         document.body.classList.add("ready");
-        supple.rest = lobe.points;
+        supple.start = liver.points;
         supple.startMilliseconds = milliseconds;
         counts.since = performance.now();
         requestAnimationFrame(tick);
         ask();
     },
     frame({ frame }) {
-        const largest = view.show(frame.positions, frame.tool, frame.pins);
-        supple.latest = { ...frame, largest, number: (supple.latest?.number ?? 0) + 1 };
-        panel.show(frame, largest);
+        view.show(frame);
+        supple.latest = { ...frame, number: (supple.latest?.number ?? 0) + 1 };
+        panel.show(frame);
         counts.simulated += frame.seconds ?? 0;
         ask();
     },
@@ -67,8 +73,9 @@ function ask() {
         return;
     }
     const now = performance.now();
+    const each = FRAME / panel.wantedPace();
     // What is missed by more than a few frames is not made up for.
-    due = Math.max(due + FRAME, now - 3 * FRAME);
+    due = Math.max(due + each, now - 3 * each);
     setTimeout(() => send({ type: "frame" }), Math.max(0, due - now));
 }
 

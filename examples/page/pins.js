@@ -1,5 +1,6 @@
-// Pins: points of the tissue that are pulled to where they were put, as many as eight. A pin is put where the pointer touches the tissue and
-// goes where it leads; it stays there when it is let go. Touched again without being led anywhere it is taken away. Metres.
+// Pins: points of the tissue that are pulled to where they were put, as many as eight. A pin is put where the pointer
+// touches the tissue and goes where it leads; it stays there when it is let go. Touched again without being led
+// anywhere it is taken away. Metres.
 
 import { FRAME } from "./simulation.js";
 
@@ -15,14 +16,20 @@ const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axi
 const length = (vector) => Math.hypot(...vector);
 
 export class Pins {
-    /** @param {import("./simulation.js").Simulation} simulation, @param surface numbers of the nodes that can be pinned */
+    /**
+     * @param {import("./simulation.js").Simulation} simulation, @param surface numbers of the nodes that can be pinned
+     */
     constructor(simulation, surface) {
         const { library } = simulation;
         Object.assign(this, { simulation, library, surface });
         const bytes = library.functions.supple_pulls_size(MOST, MOST * NODES);
         this.places = {
-            memory: library.room(bytes), bytes, pull: library.space("supple_pull"), targets: library.room(12 * MOST),
-            pulled: library.space("supple_pulled", MOST) };
+            memory: library.room(bytes),
+            bytes,
+            pull: library.space("supple_pull"),
+            targets: library.room(12 * MOST),
+            pulled: library.space("supple_pulled", MOST),
+        };
         this.remove();
     }
 
@@ -37,44 +44,84 @@ export class Pins {
     #make() {
         const { library, simulation, places } = this;
         const { scene, loads } = simulation;
-        library.call("supple_pulls_init", places.memory, places.bytes, scene, MOST, MOST * NODES, simulation.places.made);
+        library.call(
+            "supple_pulls_init",
+            places.memory,
+            places.bytes,
+            scene,
+            MOST,
+            MOST * NODES,
+            simulation.places.made,
+        );
         this.pulls = library.pointer(simulation.places.made);
         for (const { at } of this.pins) {
-            library.write(places.pull, "supple_pull", { at, radius: RADIUS, stiffness: STIFFNESS, most: 0, along: [0, 0, 0] });
-            const status = library.functions.supple_add_pull(this.pulls, scene, simulation.points, places.pull, simulation.places.error);
-            if (status < 0) return { status, name: library.name(status), text: library.text(status) };
+            library.write(places.pull, "supple_pull", {
+                at,
+                radius: RADIUS,
+                stiffness: STIFFNESS,
+                most: 0,
+                along: [0, 0, 0],
+            });
+            const status = library.functions.supple_add_pull(
+                this.pulls,
+                scene,
+                simulation.points,
+                places.pull,
+                simulation.places.error,
+            );
+            if (status < 0) return { name: library.name(status), text: library.text(status) };
         }
         library.call("supple_set_pulls", loads, this.pins.length > 0 ? this.pulls : 0);
-        this.#aim(0, 0);
-        return null;
+        return this.#aim(
+            this.pins.map(({ position }) => position),
+            0,
+            0,
+        );
     }
 
-    #aim(from, to) {
+    /** Gives what the library refused, or null. */
+    #aim(positions, from, to) {
         const { library, places, simulation } = this;
-        const targets = Float32Array.from(this.pins.flatMap(({ position }) => position));
-        library.floats(places.targets, 3 * MOST).set(targets);
-        library.call("supple_set_targets", this.pulls, places.targets, this.pins.length, from, to, simulation.places.error);
+        library.floats(places.targets, 3 * MOST).set(positions.flat());
+        const status = library.functions.supple_set_targets(
+            this.pulls,
+            places.targets,
+            positions.length,
+            from,
+            to,
+            simulation.places.error,
+        );
+        return status < 0 ? { name: library.name(status), text: library.text(status) } : null;
     }
 
-    /** A pin at the point `hit` of the surface, or the one that is there. Gives what the library refused, or null. */
-    begin(hit) {
+    /**
+     * A pin at the point `hit` of the surface, whose nodes are at `positions`, or the one that is there. Gives what the
+     * library refused, or null.
+     */
+    begin(hit, positions) {
         const at = this.pins.findIndex(({ position }) => length(plus(position, hit, -1)) < NEAR);
         if (at >= 0) {
             this.led = { pin: this.pins[at], origin: this.pins[at].position, is_new: false, way: 0 };
             return null;
         }
-        if (this.pins.length === MOST) return { status: 0, name: "", text: `${MOST} pins are the most; touch one to take it away` };
-        const node = this.#nearest(hit);
-        const rest = Array.from(this.library.floats(this.simulation.points, 3 * this.simulation.nodes).subarray(3 * node, 3 * node + 3));
+        if (this.pins.length === MOST)
+            return { name: "", text: `${MOST} pins are the most; touch one to take it away` };
+        const node = this.#nearest(hit, positions);
+        const rest = Array.from(
+            this.library.floats(this.simulation.points, 3 * this.simulation.nodes).subarray(3 * node, 3 * node + 3),
+        );
         this.pins.push({ at: rest, position: hit, target: hit });
         this.led = { pin: this.pins.at(-1), origin: hit, is_new: true, way: 0 };
         const refused = this.#make();
-        if (refused) this.pins.pop();
+        if (refused) {
+            this.pins.pop();
+            this.led = null;
+            this.#make();
+        }
         return refused;
     }
 
-    #nearest(hit) {
-        const positions = this.simulation.positions();
+    #nearest(hit, positions) {
         const apart = (node) => length(plus(Array.from(positions.subarray(3 * node, 3 * node + 3)), hit, -1));
         return this.surface.reduce((best, node) => (apart(node) < apart(best) ? node : best), this.surface[0]);
     }
@@ -95,15 +142,23 @@ export class Pins {
         this.#make();
     }
 
-    /** Tells the library where targets will be at the end of the frame that begins at `now` (s). */
+    /**
+     * Tells the library where targets will be at the end of the frame that begins at `now` (s). Gives what it refused,
+     * or null.
+     */
     move(now) {
-        if (this.pins.length === 0) return;
-        for (const pin of this.pins) {
-            const way = plus(pin.target, pin.position, -1);
+        if (this.pins.length === 0) return null;
+        const positions = this.pins.map(({ position, target }) => {
+            const way = plus(target, position, -1);
             const most = SPEED * FRAME;
-            pin.position = length(way) > most ? plus(pin.position, way, most / length(way)) : pin.target;
-        }
-        this.#aim(now, now + FRAME);
+            return length(way) > most ? plus(position, way, most / length(way)) : target;
+        });
+        const refused = this.#aim(positions, now, now + FRAME);
+        this.pins.forEach((pin, index) => {
+            if (refused) pin.target = pin.position;
+            else pin.position = positions[index];
+        });
+        return refused;
     }
 
     /** What the page shows of them: where they are, m, and with which force each pulls, N. */

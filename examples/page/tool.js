@@ -1,5 +1,6 @@
-// The instrument: a ball that presses, or forceps that hold tissue and pull it. It begins outside the body on the line from the camera to
-// the point that was touched, goes where the pointer leads it no faster than a hand would, and goes away when it is let go. Metres.
+// The instrument: a ball that presses, or forceps that hold tissue and pull it. It begins outside the body on the line
+// from the camera to the point that was touched, goes where the pointer leads it no faster than a hand would, and goes
+// away when it is let go. Metres.
 
 import { FRAME } from "./simulation.js";
 
@@ -8,21 +9,34 @@ const REACH = 0.025; // m, how far from where it began the pointer leads it
 const DEPTH = 0.008; // m, how far the ball is pressed in
 const AWAY = 0.02; // m, how far it withdraws when it is let go
 const HOLD = 0.01; // m: forceps hold what is nearer to them
-// m; `clearance`: between it and the tissue before it touches.
-const TOOLS = { press: { radius: 0.01, clearance: 0.001 }, pull: { radius: 0.004, clearance: 0.003 } };
-const FRICTION = 0.3;
+const SLIP = 5; // N: where they hold more they slip
+const FORCEPS = 0.004; // m, their radius
+const CLEARANCE = { press: 0.001, pull: 0.003 }; // m, between the instrument and the tissue before it touches
 
 const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 export class Tool {
-    /** @param {import("./simulation.js").Simulation} simulation, @param surface numbers of the nodes that it can touch */
-    constructor(simulation, surface) {
+    /**
+     * @param {import("./simulation.js").Simulation} simulation, @param surface numbers of the nodes that it can touch
+     * @param probe radius of the ball that presses, and friction
+     */
+    constructor(simulation, surface, { radius, friction }) {
         const { library, contact } = simulation;
-        Object.assign(this, { simulation, library, contact, surface });
+        Object.assign(this, {
+            simulation,
+            library,
+            contact,
+            surface,
+            friction,
+            radii: { press: radius, pull: FORCEPS },
+        });
         this.places = {
-            instrument: library.space("supple_instrument"), pose: library.space("supple_pose"),
-            touch: library.space("supple_touch"), held: library.room(4) };
+            instrument: library.space("supple_instrument"),
+            pose: library.space("supple_pose"),
+            touch: library.space("supple_touch"),
+            held: library.room(4),
+        };
         this.remove();
     }
 
@@ -34,26 +48,35 @@ export class Tool {
     }
 
     /**
-     * An instrument of this kind for the point `hit` of the surface, which the camera sees along `direction` (of length 1).
-     * Gives what the library refused, or null.
+     * An instrument of this kind for the point `hit` of the surface, whose nodes are at `positions`, and which the
+     * camera sees along `direction` (of length 1). Gives what the library refused, or null.
      */
-    begin(kind, hit, direction) {
-        if (!TOOLS[kind]) throw new Error(`no instrument ${kind}`);
+    begin(kind, hit, direction, positions) {
+        if (!CLEARANCE[kind]) throw new Error(`no instrument ${kind}`);
         const { library, places } = this;
         const { constants } = library.header;
-        const { radius, clearance } = TOOLS[kind];
+        const [radius, clearance] = [this.radii[kind], CLEARANCE[kind]];
         this.remove();
-        const start = plus(hit, direction, -this.#clear(hit, direction, radius + clearance));
+        const start = plus(hit, direction, -this.#clear(hit, direction, radius + clearance, positions));
         library.write(places.instrument, "supple_instrument", {
-            shape: constants.SUPPLE_SPHERE, radius, friction: FRICTION, pose: { position: start, rotation: [0, 0, 0, 0] } });
-        let status = library.functions.supple_set_instruments(this.contact, places.instrument, 1, this.simulation.places.error);
+            shape: constants.SUPPLE_SPHERE,
+            radius,
+            friction: this.friction,
+            pose: { position: start, rotation: [0, 0, 0, 0] },
+        });
+        let status = library.functions.supple_set_instruments(
+            this.contact,
+            places.instrument,
+            1,
+            this.simulation.places.error,
+        );
         if (status >= 0 && kind === "pull") {
             status = library.functions.supple_grasp(this.contact, this.simulation.state, 0, HOLD, places.held);
             this.held = library.pointer(places.held);
         }
         if (status < 0) {
             this.remove();
-            return { status, name: library.name(status), text: library.text(status) };
+            return { name: library.name(status), text: library.text(status) };
         }
         this.kind = kind;
         this.phase = "led";
@@ -65,8 +88,7 @@ export class Tool {
     }
 
     /** How far back from `hit` a ball of this radius is clear of all nodes before it. */
-    #clear(hit, direction, radius) {
-        const positions = this.simulation.positions();
+    #clear(hit, direction, radius, positions) {
         let back = radius;
         for (const node of this.surface) {
             const way = plus(Array.from(positions.subarray(3 * node, 3 * node + 3)), hit, -1);
@@ -93,7 +115,15 @@ export class Tool {
         this.target = plus(this.position, this.direction, -(this.kind === "press" ? DEPTH : 0) - AWAY);
     }
 
-    /** Tells the library where the instrument will be at the end of the frame that begins at `now` (s). Gives what it refused, or null. */
+    /** Whether forceps hold more than they can. */
+    slips() {
+        return this.held > 0 && this.describe().force > SLIP;
+    }
+
+    /**
+     * Tells the library where the instrument will be at the end of the frame that begins at `now` (s). Gives what it
+     * refused, or null.
+     */
     move(now) {
         if (this.kind === null) return null;
         const { library, places } = this;
@@ -103,23 +133,39 @@ export class Tool {
         const position = length > most ? plus(this.position, way, most / length) : this.target;
         library.write(places.pose, "supple_pose", { position, rotation: [0, 0, 0, 0] });
         const status = library.functions.supple_move_instrument(
-            this.contact, 0, places.pose, now, now + FRAME, this.simulation.places.error);
+            this.contact,
+            0,
+            places.pose,
+            now,
+            now + FRAME,
+            this.simulation.places.error,
+        );
         if (status < 0) {
             this.target = this.position;
-            return { status, name: library.name(status), text: library.text(status) };
+            return { name: library.name(status), text: library.text(status) };
         }
         this.position = position;
         return null;
     }
 
-    /** What the page shows of it: null without an instrument. Force of the tissue on it, N, the mean of the latest call's steps. */
+    /**
+     * What the page shows of it: null without an instrument. Force of the tissue on it, N, the mean of the latest
+     * call's steps.
+     */
     describe() {
         if (this.kind === null) return null;
         const { library, places } = this;
         library.call("supple_read_touch", this.contact, 0, places.touch);
         const { mean_force: force, contacts, depth } = library.read(places.touch, "supple_touch");
         return {
-            kind: this.kind, phase: this.phase, position: this.position, radius: TOOLS[this.kind].radius,
-            held: this.held, force: Math.hypot(...force), contacts, depth };
+            kind: this.kind,
+            phase: this.phase,
+            position: this.position,
+            radius: this.radii[this.kind],
+            held: this.held,
+            force: Math.hypot(...force),
+            contacts,
+            depth,
+        };
     }
 }

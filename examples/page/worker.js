@@ -1,38 +1,58 @@
-// The kernel in a thread of its own, so that the page answers the pointer while steps are computed. It has the library and the
-// mesh in it. Messages in: begin, lead, release, method, reset, frame. Out: ready, frame, failed. SI units.
+// The kernel in a thread of its own, so that the page answers the pointer while steps are computed. It has the library
+// and the liver in it. Messages in: begin, lead, release, breathe, method, compare, reset, frame. Out: ready, frame,
+// failed. SI units.
 
 import header from "built:header.json";
-import mesh from "built:lobe.json";
+import scene from "built:liver.json";
 import compressed from "built:supple.wasm.gz";
 
-import { Library } from "../../src/javascript/library.js";
-import { Simulation } from "./simulation.js";
+import { Compared } from "./compared.js";
 
-let simulation;
+let compared;
 /** What the library refused in a message, until the next frame tells it. */
 let refused = null;
 
 async function start() {
     const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream("gzip"));
     const module = await WebAssembly.compile(await new Response(stream).arrayBuffer());
-    const [tetrahedra, triangles, groups] = [mesh.tetrahedra, mesh.triangles, mesh.groups].map((numbers) => Uint32Array.from(numbers));
-    const lobe = { points: Float32Array.from(mesh.points), tetrahedra, triangles, groups };
+    const liver = {
+        ...scene,
+        tetrahedra: Uint32Array.from(scene.tetrahedra),
+        triangles: Uint32Array.from(scene.triangles),
+    };
     const begin = performance.now();
-    simulation = new Simulation(new Library(module, header), lobe);
-    postMessage({ type: "ready", lobe, milliseconds: performance.now() - begin });
+    compared = new Compared(module, header, liver);
+    const { start: points, target, inside } = compared.shown;
+    postMessage({
+        type: "ready",
+        milliseconds: performance.now() - begin,
+        liver: {
+            points,
+            triangles: liver.triangles,
+            tetrahedra: liver.tetrahedra.length / 4,
+            target,
+            radius: liver.tumour.radius,
+            surfaces: inside.surfaces,
+            inside: inside.positions(),
+        },
+    });
 }
 
 const answers = {
-    begin: ({ kind, hit, direction }) => { refused = simulation.begin(kind, hit, direction); },
-    lead: ({ way }) => simulation.leading.lead(way),
-    release: () => simulation.leading.release(),
-    method: ({ method, tolerance }) => simulation.setMethod(method, tolerance),
-    reset: () => simulation.reset(),
+    begin: ({ kind, hit, direction }) => {
+        refused = compared.begin(kind, hit, direction);
+    },
+    lead: ({ way }) => compared.lead(way),
+    release: () => compared.release(),
+    breathe: ({ goes }) => compared.breathe(goes),
+    method: ({ method, tolerance }) => compared.setMethod(method, tolerance),
+    compare: ({ goes }) => compared.compare(goes),
+    reset: () => compared.reset(),
     frame: () => {
-        const frame = simulation.frame();
+        const frame = compared.frame();
         frame.refusal ??= refused;
         refused = null;
-        postMessage({ type: "frame", frame }, [frame.positions.buffer]);
+        postMessage({ type: "frame", frame }, [frame.positions.buffer, frame.inside.buffer]);
     },
 };
 

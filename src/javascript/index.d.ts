@@ -20,16 +20,27 @@ export interface Mesh {
     groups?: ArrayLike<number>;
 }
 
-export interface Body {
+export interface Shape {
     /** "neo-hookean" unless it is given. */
     law?: Law;
-    /** Of the law, at most four, in the order of supple.h. */
-    constants: number[];
-    density: number;
     /** "nodal-strain" unless it is given. */
     element?: "linear" | "nodal-pressure" | "nodal-strain";
     /** Nodes that are held. */
     fixed?: number[];
+    /** Nodes that are held, and led by `setMotions`. */
+    moved?: number[];
+}
+
+/** A tissue: constants of the law, at most four, in the order of supple.h, and density. */
+export interface Tissue {
+    constants: number[];
+    density: number;
+}
+
+/** Several, and of each tetrahedron which. */
+export interface Tissues {
+    tissues: Tissue[];
+    tissueOfElement: ArrayLike<number>;
 }
 
 export interface Settings {
@@ -42,6 +53,11 @@ export interface Settings {
     /** Mean error of the nodes that automatic steps keep to, and that the guard of long ones allows, m. */
     tolerance?: number;
     guard?: boolean;
+    /**
+     * The most exact steps that a call of `advance` takes, a long one counts four; then its status is SUPPLE_BEHIND. 0:
+     * as many as it needs.
+     */
+    mostSteps?: number;
 }
 
 export interface Report {
@@ -60,7 +76,7 @@ export declare function readMesh(text: string, name: string): Required<Mesh>;
 
 /** A body in motion. */
 export declare class Simulation {
-    constructor(library: Library, mesh: Mesh, body: Body, settings?: Settings);
+    constructor(library: Library, mesh: Mesh, body: Shape & (Tissue | Tissues), settings?: Settings);
     readonly library: Library;
     /** How many. */
     readonly nodes: number;
@@ -76,6 +92,13 @@ export declare class Simulation {
     setGravity(gravity: Vector): void;
     /** In place of those before. */
     setForces(forces: { node: number; newton: Vector; ramp?: number }[]): void;
+    /**
+     * Displacements of nodes that are `moved`, in place of those before; without a ramp (s) reached at the end of the
+     * next call that moves the body.
+     */
+    setMotions(motions: { node: number; metre: Vector; ramp?: number }[]): void;
+    /** Brings the body to within so many metres of where it rests under its loads; gives the steps that it took. */
+    settle(metres: number, mostSteps?: number): number;
     /** At rest at time zero; loads stay. */
     reset(): void;
     /** Moves on by so many seconds; throws a Refusal where nothing could be moved. */
@@ -103,6 +126,8 @@ export declare class Library {
     layout(name: keyof Structures): { size: number; align: number; fields: Record<string, { type: string; offset: number; count: number }> };
     /** Fills a structure; what is not named is zero. */
     write<Name extends keyof Structures>(place: number, name: Name, values: Part<Structures[Name]>): number;
+    /** Fills structures that lie one after the other. */
+    writeAll<Name extends keyof Structures>(place: number, name: Name, list: Part<Structures[Name]>[]): number;
     read<Name extends keyof Structures>(place: number, name: Name): Structures[Name];
     pointer(place: number): number;
     /** Calls a function that gives a status; throws a Refusal if that is an error. */

@@ -70,6 +70,13 @@ export class Library {
         return place;
     }
 
+    /** Fills structures that lie one after the other. */
+    writeAll(place, name, list) {
+        const { size } = this.layout(name);
+        list.forEach((values, index) => this.write(place + size * index, name, values));
+        return place;
+    }
+
     /** A structure as an object. */
     read(place, name) {
         const object = {};

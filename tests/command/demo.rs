@@ -47,3 +47,32 @@ fn the_demo_compares_steps_and_leaves_a_report_and_frames() {
     assert!(summary["volume_change_percent"].as_f64().unwrap().abs() < 2.0);
     assert!(summary["instruments"][0]["largest_force_n"].as_f64().unwrap() > 0.1);
 }
+
+#[test]
+fn the_liver_of_the_web_page_is_that_of_the_demo() {
+    let said = Desk::new().supple(&["liver"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let liver: serde_json::Value = serde_json::from_str(&said.out).unwrap();
+    let numbers = |of: &serde_json::Value| -> Vec<f64> {
+        of.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    };
+    let [points, corners, tissues] = ["points", "tetrahedra", "tissueOfElement"].map(|name| numbers(&liver[name]));
+    assert_eq!((points.len(), corners.len(), tissues.len()), (3 * 2_049, 4 * 8_201, 8_201));
+    // Five and three times as stiff as the liver.
+    let stiffness = [0, 1, 2].map(|tissue| liver["tissues"][tissue]["constants"][0].as_f64().unwrap());
+    assert_eq!(stiffness, [2_000.0, 10_000.0, 6_000.0]);
+    // The tumour is what is around its middle, of about the volume of its ball.
+    let (middle, radius) = (numbers(&liver["tumour"]["centre"]), liver["tumour"]["radius"].as_f64().unwrap());
+    let mut volume = 0.0;
+    for (tet, _) in corners.chunks(4).zip(&tissues).filter(|(_, tissue)| **tissue == 1.0) {
+        let corner = |index: usize| [0, 1, 2].map(|axis| points[3 * tet[index] as usize + axis]);
+        let [a, b, c, d] = [0, 1, 2, 3].map(corner);
+        let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|axis| p[axis] - a[axis]));
+        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        volume += (0..3).map(|axis| cross[axis] * w[axis]).sum::<f64>().abs() / 6.0;
+        let off = |axis: usize| 0.25 * (a[axis] + b[axis] + c[axis] + d[axis]) - middle[axis];
+        assert!((0..3).map(|axis| off(axis).powi(2)).sum::<f64>().sqrt() < radius);
+    }
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+    assert!((volume / ball - 1.0).abs() < 0.2, "{volume} m^3, the ball has {ball} m^3");
+}

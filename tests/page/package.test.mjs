@@ -52,6 +52,31 @@ test("a lobe sags in node, by the lines of its README", (context) => {
     context.diagnostic(`from the file to here: ${((performance.now() - start) / 1e3).toFixed(1)} s`);
 });
 
+test("tissue of two kinds hangs from nodes that move", () => {
+    const seen = run(`${body}
+        const middle = (nodes) => nodes.reduce((sum, node) => sum + mesh.points[3 * node] / 4, 0);
+        const corners = Array.from({ length: mesh.tetrahedra.length / 4 }, (_, tet) =>
+            Array.from(mesh.tetrahedra.subarray(4 * tet, 4 * tet + 4)));
+        const sag = (stiffer) => {
+            const tissues = [1, stiffer].map((times) => ({ constants: [750 * times, 40_000], density: 1060 }));
+            const tissueOfElement = corners.map((nodes) => Number(middle(nodes) > 0));
+            const settings = { damping: 20, mostSteps: 2000 };
+            const hangs = new Simulation(lobe.library, mesh, { tissues, tissueOfElement, moved: fixed }, settings);
+            hangs.setGravity([0, 0, -9.81]);
+            const steps = hangs.settle(1e-5);
+            const hung = hangs.positions().slice();
+            hangs.setMotions(fixed.map((node) => ({ node, metre: [0, 0, 0.002] })));
+            const { status } = hangs.advance(0.1);
+            const led = hangs.positions()[3 * fixed[0] + 2] - mesh.points[3 * fixed[0] + 2];
+            return { steps, status, led, most: Math.max(...hung.map((metre, at) => Math.abs(metre - mesh.points[at]))) };
+        };
+        console.log(JSON.stringify([1, 20].map(sag)));`);
+    for (const { steps, status, led } of seen) {
+        assert.ok(steps > 100 && status === "SUPPLE_OK" && Math.abs(led - 0.002) < 1e-6, JSON.stringify(seen));
+    }
+    assert.ok(seen[1].most < 0.95 * seen[0].most && seen[1].most > 0.002, JSON.stringify(seen));
+});
+
 test("what cannot be is refused in words", () => {
     const said = run(`import { Refusal } from "supple-kernel";\n${body}
         const said = [];
@@ -64,12 +89,16 @@ test("what cannot be is refused in words", () => {
         attempt(() => other({ density: -1 }));
         attempt(() => lobe.setForces([{ node: 1e6, newton: [1, 0, 0] }]));
         attempt(() => lobe.advance(-1));
+        attempt(() => other({ tissues: [{ constants: [750, 40_000], density: 1060 }, { constants: [1, 1], density: 1 }] }));
+        attempt(() => lobe.setMotions([{ node: 0, metre: [0, 0, 0] }]));
         console.log(JSON.stringify(said));`);
     assert.match(said[0], /no method fast/);
     assert.match(said[2], /no law rubber, only neo-hookean/);
     assert.match(said[4], /supple_sim_(size|setup): .*SUPPLE_E_/);
     assert.match(said[6], /supple_set_forces: .*SUPPLE_E_/);
     assert.match(said[8], /supple_sim_advance: .*SUPPLE_E_NEGATIVE/);
+    assert.match(said[10], /tissueOfElement has 0 entries, there are 8201 tetrahedra/);
+    assert.match(said[12], /1 motions, 0 nodes are moved/);
     assert.deepEqual([said[1], said[3], said[5], said[7], said[9]], [false, false, true, true, true]);
 });
 
@@ -77,13 +106,18 @@ test("its types are those of a program in TypeScript", () => {
     writeFileSync(join(folder, "program.ts"), `${body}
         const report = lobe.advance(0.1);
         const mean: number | undefined = report.estimate?.mean;
+        lobe.setMotions([{ node: fixed[0], metre: [0, 0, 0.001], ramp: 0.1 }]);
+        const two = { tissues: [{ constants: [750, 40_000], density: 1060 }], tissueOfElement: [0], moved: [1] };
+        const steps: number = new Simulation(lobe.library, mesh, two).settle(1e-5);
         const place = lobe.library.write(lobe.library.space("supple_force"), "supple_force", { node: 3, newton: [0, 0, 1] });
         const status: number = lobe.library.functions.supple_set_forces(lobe.loads, place, 1, 0);
         // @ts-expect-error
         lobe.library.write(place, "supple_force", { nodes: 3 });
         // @ts-expect-error
         lobe.set({ method: "fast" });
-        console.log(mean, status);`);
+        // @ts-expect-error
+        new Simulation(lobe.library, mesh, { fixed });
+        console.log(mean, status, steps);`);
     const tools = join(root, "src/javascript/node_modules");
     const options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext", "--typeRoots", join(tools, "@types"), "--types", "node"];
     try {

@@ -2,6 +2,8 @@
 //! ultrasound probe presses it: by exact, long and adaptive steps side by side, and by a learned step, which refuses the
 //! probe. The mesh is in the program, so the command needs no files.
 
+pub(crate) mod page;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -123,9 +125,14 @@ fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, O
     Ok((Run { setup, name, done }, folder))
 }
 
-/// The lobe of the library's meshes, refined.
+/// The lobe of the library's meshes.
+fn lobe() -> Result<TetMesh, Problem> {
+    parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)
+}
+
+/// The same, refined.
 fn mesh() -> Result<TetMesh, Problem> {
-    let lobe = parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)?;
+    let lobe = lobe()?;
     let (points, tets) = refined(lobe.points, &lobe.tets);
     Ok(TetMesh { points, tets, ..TetMesh::default() })
 }

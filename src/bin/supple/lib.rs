@@ -76,6 +76,9 @@ enum Command {
         #[arg(long, default_value = "out/demo")]
         out: PathBuf,
     },
+    /// The liver of the demo on a coarser mesh, as JSON: tools/page.sh makes the web page of it
+    #[command(hide = true)]
+    Liver,
     /// Make the signed distances of a closed surface, for an instrument of any form
     Field(field::Asked),
     Fit(fit::Asked),
@@ -101,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Simulate { scene, out, force, unchecked } => simulate::simulate(&scene, &out, force, unchecked),
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
+        Command::Liver => demo::page::liver(),
         Command::Field(asked) => field::make(&asked),
         Command::Fit(asked) => fit::fit(&asked),
         Command::Unloaded(asked) => unloaded::unloaded(&asked),
