@@ -20,9 +20,10 @@ impl Clock {
         if libm::fabs(due - now) <= 1e-6 * seconds { now + seconds } else { self.until }
     }
 
-    /// The call has ended at this time (s) with this status. What its work did not suffice for is not made up for.
+    /// The call has ended at this time (s) with this status. What its work did not suffice for is not made up for, nor
+    /// what comes after a step that was refused: a call is never of more than its own span.
     pub const fn ended(&mut self, time: f64, status: Status) {
-        if matches!(status, Status::Behind { .. }) {
+        if matches!(status, Status::Behind { .. } | Status::Diverged(_)) {
             self.until = time;
         }
         self.ended = time;

@@ -335,7 +335,11 @@ fn what_is_refused_is_told_and_leaves_the_motion_as_it_was() {
     assert!(error.contains("is above the stable"), "{error}");
     simulation.set(Settings { damping: DAMPING, ..Settings::default() });
     assert_eq!(bits(simulation.state()), before);
+    // A call after a refused one is no longer for it.
+    let time = simulation.state().time();
     assert!(simulation.advance(FRAME).unwrap().is_ok());
+    let gone = simulation.state().time() - time;
+    assert!((gone - FRAME).abs() < 1e-6 * FRAME, "{gone} s in a call of {FRAME} s");
 }
 
 /// Whatever moves it: no call takes more work than it may, each says what is missing, and nothing is made up for.
