@@ -8,6 +8,7 @@ use crate::reference::dense::{Matrix, cholesky, zeros};
 
 use super::band::{Band, Row, factorise, solve};
 use super::lattice::Lattice;
+use super::layout::Layout;
 use crate::element::NodeInertia;
 use crate::mesh::Bar;
 
@@ -17,7 +18,7 @@ fn lattice(cells: [u32; 3]) -> Lattice {
     let points: Vec<_> = bar.points().collect();
     let held = |point: &[f32; 3]| if point[2] < 0.025 { [0.0; 3] } else { [1e3; 3] };
     let inertia: Vec<_> = points.iter().map(|point| NodeInertia { inverse: held(point), mass: 1e-3 }).collect();
-    Lattice::new(cells, &points, &inertia).unwrap()
+    Lattice::new(cells, &Layout::one(&points), &inertia).unwrap()
 }
 
 /// A random positive matrix that couples what cells couple.

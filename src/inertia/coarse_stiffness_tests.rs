@@ -11,6 +11,7 @@ use crate::reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
 use super::band::{Row, solve};
 use super::clusters::ClusterInput;
 use super::lattice::{Grid, Lattice, LatticeNode, MAX_FUNCTIONS, sort_by_cell};
+use super::layout::Layout;
 use super::matrices::{Bands, Matrices, vectors_for};
 use super::node::Scaling;
 use super::node_tables::{self, NodeTables};
@@ -58,6 +59,8 @@ struct Prepared<'a, 'm, M> {
     scene: SceneView<'a, M>,
     points: &'a [[f32; 3]],
     lattice: &'a Lattice,
+    /// Of each node, in cells along each axis.
+    positions: &'a [[f64; 3]],
     places: &'a [LatticeNode],
     displacement: &'a [NodeVector],
     matrices: &'a Matrices<'m>,
@@ -70,8 +73,11 @@ fn prepare<M: ElementMaterial>(material: M, supports: &[Support], h: &Mat3, judg
     let mesh = Mesh::new(&points, &tets, Winding::Normalised).unwrap();
     let scene = VecScene::build(material, &mesh, supports).unwrap();
     let scene = scene.view();
-    let lattice = &Lattice::new(CELLS, &points, scene.inertia).unwrap();
-    let mut places: Vec<_> = points.iter().map(|&point| lattice.place(point)).collect();
+    let layout = Layout::one(&points);
+    let lattice = &Lattice::new(CELLS, &layout, scene.inertia).unwrap();
+    let mut places = vec![LatticeNode::default(); points.len()];
+    lattice.write_places(&layout, &mut places);
+    let positions: Vec<_> = places.iter().map(|place| lattice.position(place).map(f64::from)).collect();
     sort_by_cell(&mut places);
     let (places, grid) = (&*places, Grid { cells: CELLS, functions: lattice.functions() });
     let pieces = [tets.len(), if scene.element().is_nodal_strain() { points.len() } else { 0 }];
@@ -96,6 +102,7 @@ fn prepare<M: ElementMaterial>(material: M, supports: &[Support], h: &Mat3, judg
         scene,
         points: &points,
         lattice,
+        positions: &positions,
         places,
         displacement: &displacement,
         matrices: &matrices,
@@ -111,9 +118,8 @@ impl<M: ElementMaterial> Prepared<'_, '_, M> {
         3 * self.lattice.functions()
     }
 
-    /// In cells along each axis.
     fn position(&self, node: usize) -> [f64; 3] {
-        self.lattice.position(&self.lattice.place(self.points[node])).map(f64::from)
+        self.positions[node]
     }
 
     fn elements(&self) -> Vec<Reference> {

@@ -18,6 +18,7 @@ use super::coarse_motion::CoarseSpace;
 use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, sort_by_cell};
+use super::layout::Layout;
 use super::matrices::{Bands, Matrices};
 use super::method::{Cells, Method, largest_grid, pieces, vectors_for_lattice, vectors_of_places};
 use super::node::{Scaling, half_damping};
@@ -84,7 +85,8 @@ impl<'a> Storage<'a> {
 
 impl<'w> LargeModel<'w> {
     /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
-    /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is overwritten.
+    /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is overwritten. Up to eight bodies
+    /// that share no node have functions of their own, as many in all as there is room for.
     pub fn prepare<M: ElementMaterial>(
         method: Method<'w>,
         scene: SceneView<'_, M>,
@@ -116,7 +118,7 @@ impl<'w> LargeModel<'w> {
     }
 
     /// Computes all inertia, with coarser lattices as long as single precision cannot invert the matrices of a suggested
-    /// one.
+    /// one. Bodies that share no node are set apart ([`Layout`]) where there is room for that.
     fn first_cycles<M: ElementMaterial>(
         &mut self,
         mut grid: Grid,
@@ -125,21 +127,42 @@ impl<'w> LargeModel<'w> {
         mut state: StateView<'_>,
         storage: &mut [NodeVector],
     ) -> Result<(), InertiaError> {
+        let (room, nodes, elements) = (storage.len(), self.nodes, self.elements);
+        let fits = |grid: &Grid| vectors_for_lattice(scene.element(), nodes, elements, *grid) <= room;
+        let cells = self.method.cells;
+        let largest = |layout: &Layout<'_>, mut below| {
+            loop {
+                // A coarser one may have wider layers, and need more than there is room for.
+                let grid = largest_grid(scene, layout, below);
+                if grid.functions == 0 || fits(&grid) {
+                    return grid;
+                }
+                below = grid.functions;
+            }
+        };
+        let layout = Layout::of_bodies(scene, points, labels_in(storage));
+        let is_apart = layout.bodies() > 1 && {
+            let apart = match cells {
+                Cells::Suggested => largest(&layout, usize::MAX),
+                Cells::Given(cells) => {
+                    let functions = Lattice::functions_for(cells, &layout, scene.inertia).unwrap_or_default();
+                    Grid { cells, functions }
+                }
+            };
+            let is_possible = apart.functions > 0 && fits(&apart);
+            if is_possible {
+                grid = apart;
+            }
+            is_possible
+        };
         loop {
-            let answer = self.first_cycle(grid, scene, points, state.reborrow(), storage);
-            if !matches!(answer, Err(InertiaError::Singular { .. })) || self.method.cells != Cells::Suggested {
+            let answer = self.first_cycle(grid, scene, (points, is_apart), state.reborrow(), storage);
+            if !matches!(answer, Err(InertiaError::Singular { .. })) || cells != Cells::Suggested {
                 return answer;
             }
-            // A coarser one may have wider layers, and need more than there is room for.
-            let needed = |grid| vectors_for_lattice(scene.element(), self.nodes, self.elements, grid);
-            loop {
-                grid = largest_grid(scene, points, grid.functions);
-                if grid.functions == 0 {
-                    return answer;
-                }
-                if needed(grid) <= storage.len() {
-                    break;
-                }
+            grid = largest(&layout_of(scene, (points, is_apart), labels_in(storage)), grid.functions);
+            if grid.functions == 0 {
+                return answer;
             }
         }
     }
@@ -176,16 +199,16 @@ impl<'w> LargeModel<'w> {
         }
     }
 
-    /// Makes the lattice and the clusters, and computes all inertia.
+    /// Makes the lattice on points that may be apart, and the clusters, and computes all inertia.
     fn first_cycle<M: ElementMaterial>(
         &mut self,
         grid: Grid,
         scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
+        points: (&[[f32; 3]], bool),
         state: StateView<'_>,
         storage: &mut [NodeVector],
     ) -> Result<(), InertiaError> {
-        self.lattice.set(grid.cells, points, scene.inertia)?;
+        self.lattice.set(grid.cells, &layout_of(scene, points, labels_in(storage)), scene.inertia)?;
         self.renewal.bands = Bands::new(&self.lattice);
         let check = |kind, needed, capacity| {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
@@ -201,9 +224,7 @@ impl<'w> LargeModel<'w> {
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
-        for (place, &point) in places.iter_mut().zip(points) {
-            *place = lattice.place(point);
-        }
+        lattice.write_places(&layout_of(scene, points, labels_in(tables.scratch)), places);
         sort_by_cell(places);
         write_limits(scene, places, &mut tables);
         let StateView { displacement, volume, progress, .. } = state;
@@ -212,7 +233,7 @@ impl<'w> LargeModel<'w> {
         if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
             return singular;
         }
-        matrices.frames.choose(lattice, places, points, scene.inertia);
+        matrices.frames.choose(lattice, places, points.0, scene.inertia);
         self.stiffening = [1.0; 2];
         let mut compared = self.step;
         for index in 0..self.stiffening.len() {
@@ -429,6 +450,20 @@ impl<'w> LargeStep<'w, std::vec::Vec<NodeVector>> {
         let storage = std::vec![NodeVector::ZERO; super::vectors_for(&method, scene, points)?];
         Self::prepare(method, scene, points, state, step, storage)
     }
+}
+
+/// Room for a number for each node, which may be overwritten.
+fn labels_in(vectors: &mut [NodeVector]) -> &mut [u32] {
+    must_cast_slice_mut::<NodeVector, [u32; 4]>(vectors).as_flattened_mut()
+}
+
+/// Where nodes are for the lattice, its bodies apart or not.
+fn layout_of<'a, M>(
+    scene: SceneView<'_, M>,
+    (points, is_apart): (&'a [[f32; 3]], bool),
+    labels: &'a mut [u32],
+) -> Layout<'a> {
+    if is_apart { Layout::of_bodies(scene, points, labels) } else { Layout::one(points) }
 }
 
 /// The lattice of a method, and that the points are those of the scene.

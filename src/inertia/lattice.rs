@@ -10,6 +10,7 @@ use glam::{Mat3, Vec4};
 
 use super::InertiaError;
 use super::frames::Matrix;
+use super::layout::Layout;
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::NodeVector;
@@ -193,8 +194,7 @@ const MAX_LIGHT: usize = 64;
 pub(super) struct Lattice {
     /// Cells along each axis.
     cells: [u32; 3],
-    /// Lowest corner and size of the box, m.
-    low: [f32; 3],
+    /// Size of the box, m.
     size: [f32; 3],
     functions: usize,
     /// Function of each lattice point; or from [`Lattice::functions`] on the number of a light point, or [`HELD`] or
@@ -209,7 +209,6 @@ pub(super) struct Lattice {
 impl Lattice {
     pub(super) const NONE: Self = Self {
         cells: [0; 3],
-        low: [0.0; 3],
         size: [0.0; 3],
         functions: 0,
         function_of_point: [HELD; MAX_POINTS],
@@ -226,10 +225,10 @@ impl Lattice {
         self.cells
     }
 
-    /// A lattice of these cells on the box around the points (m).
-    pub(super) fn new(cells: [u32; 3], points: &[[f32; 3]], inertia: &[NodeInertia]) -> Result<Self, InertiaError> {
+    /// A lattice of these cells on the box around the nodes.
+    pub(super) fn new(cells: [u32; 3], layout: &Layout<'_>, inertia: &[NodeInertia]) -> Result<Self, InertiaError> {
         let mut lattice = Self::NONE;
-        lattice.set(cells, points, inertia)?;
+        lattice.set(cells, layout, inertia)?;
         Ok(lattice)
     }
 
@@ -237,10 +236,10 @@ impl Lattice {
     #[inline(never)]
     pub(super) fn functions_for(
         cells: [u32; 3],
-        points: &[[f32; 3]],
+        layout: &Layout<'_>,
         inertia: &[NodeInertia],
     ) -> Result<usize, InertiaError> {
-        Ok(Self::new(cells, points, inertia)?.functions)
+        Ok(Self::new(cells, layout, inertia)?.functions)
     }
 
     /// Makes this such a lattice.
@@ -248,22 +247,19 @@ impl Lattice {
     pub(super) fn set(
         &mut self,
         cells: [u32; 3],
-        points: &[[f32; 3]],
+        layout: &Layout<'_>,
         inertia: &[NodeInertia],
     ) -> Result<(), InertiaError> {
         let fits = cells.iter().all(|&count| (1..MAX_POINTS as u32).contains(&count))
             && cells.iter().map(|&count| count as usize + 1).product::<usize>() <= MAX_POINTS;
-        if !fits {
-            return Err(InertiaError::Cells { cells });
-        }
-        (self.cells, self.functions, self.light_points) = (cells, 0, 0);
-        (self.low, self.size) = bounding_box(points);
+        let Some(size) = layout.box_of(cells).filter(|_| fits) else { return Err(InertiaError::Cells { cells }) };
+        (self.cells, self.size, self.functions, self.light_points) = (cells, size, 0, 0);
         let [along, across, _] = cells.map(|count| (count as usize).max(1));
         for (cell, indices) in self.indices_of_cell.iter_mut().enumerate() {
             *indices = [cell % along, cell / along % across, cell / along / across].map(|at| at as u8);
         }
         let mut masses = [PointMass::default(); MAX_POINTS];
-        self.add_masses(points, inertia, &mut masses);
+        self.add_masses(layout, inertia, &mut masses);
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
         let mut full = false;
         // First those that are light, without numbers.
@@ -416,27 +412,37 @@ impl Lattice {
     }
 
     /// Adds the masses (kg) of the nodes to those of the points.
-    fn add_masses(&self, points: &[[f32; 3]], inertia: &[NodeInertia], masses: &mut [PointMass; MAX_POINTS]) {
-        for (&point, inertia) in points.iter().zip(inertia).filter(|(_, inertia)| !inertia.is_alone()) {
+    fn add_masses(&self, layout: &Layout<'_>, inertia: &[NodeInertia], masses: &mut [PointMass; MAX_POINTS]) {
+        layout.each_node(self.cells, |node, offset| {
+            let Some(inertia) = inertia.get(node).filter(|inertia| !inertia.is_alone()) else { return };
             let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
-            let node = self.place(point);
+            let node = self.place(offset);
             for (point, weight) in self.corner_points(node.cell()).into_iter().zip(node.eight_weights()) {
                 if let Some(mass) = masses.get_mut(point) {
                     mass.free += inertia.mass * weight * free;
                     mass.held += inertia.mass * weight * (1.0 - free);
                 }
             }
-        }
+        });
     }
 
-    /// The place of a point, m.
-    pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
+    /// Writes the place of each node.
+    pub(super) fn write_places(&self, layout: &Layout<'_>, places: &mut [LatticeNode]) {
+        layout.each_node(self.cells, |node, offset| {
+            if let Some(place) = places.get_mut(node) {
+                *place = self.place(offset);
+            }
+        });
+    }
+
+    /// The place of a point, m from the lowest corner of the box.
+    fn place(&self, offset: [f32; 3]) -> LatticeNode {
         let mut position = [0.0; 3];
         for axis in 0..3 {
             let (count, size) = (self.cells[axis] as f32, self.size[axis]);
             if size > 0.0 {
                 // Rounding may put the last node slightly outside the box.
-                position[axis] = ((point[axis] - self.low[axis]) / size * count).clamp(0.0, count);
+                position[axis] = (offset[axis] / size * count).clamp(0.0, count);
             }
         }
         let cell = self.cell_at(position);
@@ -634,7 +640,8 @@ impl Lattice {
 /// One vector for each function, and one more that stands for the dropped functions.
 pub(super) type CoarseVectors = [NodeVector; MAX_FUNCTIONS + 1];
 
-fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
+/// Lowest corner and size of the box around points, m.
+pub(super) fn bounding_box<'a>(points: impl Iterator<Item = &'a [f32; 3]>) -> ([f32; 3], [f32; 3]) {
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for point in points {
         for axis in 0..3 {
@@ -647,14 +654,5 @@ fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
 
 /// Size of the box around the points, m.
 pub(crate) fn size_of(points: &[[f32; 3]]) -> [f32; 3] {
-    bounding_box(points).1
-}
-
-/// Three grids of near-cubic cells, with `parts` cells along the longest side of the box around the points. Along the
-/// other sides the number of cells is rounded down, to the nearest integer and up.
-pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 3] {
-    let size = size_of(points);
-    let longest = size.iter().copied().fold(0.0, f32::max);
-    // 0.01, because rounding may make an integer slightly smaller or larger.
-    [0.01, 0.5, 0.99].map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1)))
+    bounding_box(points.iter()).1
 }

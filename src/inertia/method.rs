@@ -6,6 +6,7 @@ use crate::simd::NodeVector;
 
 use super::damper::Damper;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
+use super::layout::Layout;
 use super::{InertiaError, coarse_room, matrices, node_tables};
 
 /// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and a small
@@ -55,9 +56,9 @@ impl Cells {
     /// The lattice on a scene with these `points` (m).
     pub fn grid<M: Material>(self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
         match self {
-            Self::Suggested => Ok(largest_grid(scene, points, usize::MAX)),
+            Self::Suggested => Ok(largest_grid(scene, &Layout::one(points), usize::MAX)),
             Self::Given(cells) => {
-                let functions = Lattice::functions_for(cells, points, scene.inertia)?;
+                let functions = Lattice::functions_for(cells, &Layout::one(points), scene.inertia)?;
                 Ok(Grid { cells, functions })
             }
         }
@@ -144,23 +145,23 @@ const FUNCTIONS_OF_ROOT: f64 = 0.7;
 const FEW_FUNCTIONS: usize = 68;
 
 /// See [`Cells::Suggested`]; of the lattices with fewer than `below` functions.
-pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
-    let grids = NODES_PER_FUNCTION.map(|nodes| below.min(points.len() / nodes + 1));
-    let [many, few] = grids.map(|below| grid_below(scene, points, below));
+pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, below: usize) -> Grid {
+    let grids = NODES_PER_FUNCTION.map(|nodes| below.min(scene.node_count() / nodes + 1));
+    let [many, few] = grids.map(|below| grid_below(scene, layout, below));
     if many.functions > 0 { many } else { few }
 }
 
 /// The largest suitable lattice with fewer than `below` functions.
-fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
+fn grid_below<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, below: usize) -> Grid {
     let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
     let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
-    let least = lattice::size_of(points).map(|size| LEAST_SPACING * edge / size);
+    let least = layout.size().map(|size| LEAST_SPACING * edge / size);
     let (mut best, most) = (Grid::default(), most_functions(scene.element_count()));
-    for cells in (1..64).flat_map(|parts| lattice::near_cubic(points, parts)) {
+    for cells in (1..64).flat_map(|parts| layout.near_cubic(parts)) {
         if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
             continue;
         }
-        let Ok(functions) = Lattice::functions_for(cells, points, scene.inertia) else {
+        let Ok(functions) = Lattice::functions_for(cells, layout, scene.inertia) else {
             break;
         };
         if functions > best.functions

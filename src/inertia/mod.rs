@@ -82,6 +82,7 @@ mod damper;
 mod frames;
 mod large_step;
 mod lattice;
+mod layout;
 mod local_response;
 mod matrices;
 mod method;

@@ -10,6 +10,7 @@ mod reference;
 mod support;
 
 mod adaptive;
+mod bodies;
 mod damper;
 mod guard;
 mod pulled;
