@@ -49,7 +49,7 @@ fn pulled<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, count: u32
     }
     let [moved, truth] = [&state, &exact].map(|state| to_f64(state.displacements()));
     let of = |first: bool, all: &[[f64; 3]]| -> Vec<_> {
-        let is_wanted = |node: usize| (node as u32 % count == 0) == first;
+        let is_wanted = |node: usize| (node as u32).is_multiple_of(count) == first;
         all.iter().enumerate().filter(|(node, _)| is_wanted(*node)).map(|(_, vector)| *vector).collect()
     };
     let (own, exact) = (of(true, &moved), of(true, &truth));
