@@ -14,6 +14,8 @@ const MOST: usize = 8;
 const GAP: u32 = 2;
 /// A body begins and ends this share of a cell from a lattice point, so that rounding puts no node beyond it.
 const MARGIN: f32 = 0.01;
+/// The number of a node in no element, as where all nodes of its elements are held.
+const NONE: u32 = u32::MAX;
 
 /// See the module.
 pub(super) struct Layout<'a> {
@@ -48,12 +50,20 @@ impl<'a> Layout<'a> {
         if found < 2 {
             return Self::one(points);
         }
-        let (body_of_node, bodies) = (&*labels, found.min(MOST));
-        let boxes = from_fn(|body| {
-            let own = points.iter().zip(body_of_node).enumerate();
-            let own = own.filter(|(node, (_, label))| **label as usize == body && !scene.is_alone(*node));
-            bounding_box(own.map(|(_, (point, _))| point))
-        });
+        let bodies = found.min(MOST);
+        let boxes_of = |labels: &[u32]| {
+            from_fn(|body| {
+                let own = points.iter().zip(labels).enumerate();
+                let own = own.filter(|(node, (_, label))| **label as usize == body && !scene.is_alone(*node));
+                bounding_box(own.map(|(_, (point, _))| point))
+            })
+        };
+        // What is held on all sides belongs to the body next to it.
+        let boxes: [_; MOST] = boxes_of(labels);
+        for (label, point) in labels.iter_mut().zip(points).filter(|(label, _)| **label == NONE) {
+            *label = nearest(boxes.iter().take(bodies), point) as u32;
+        }
+        let (boxes, body_of_node) = (boxes_of(labels), &*labels);
         let mut layout = Self { points, body_of_node, boxes, bodies, axis: 0 };
         let lengths = [0, 1, 2].map(|axis| layout.lengths(axis).sum::<f32>());
         layout.axis = (1..3).fold(0, |least, axis| if lengths[axis % 3] < lengths[least % 3] { axis } else { least });
@@ -86,7 +96,8 @@ impl<'a> Layout<'a> {
         [0.01, 0.5, 0.99].map(|up| {
             let mut cells = size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1));
             if self.bodies > 1 {
-                cells[self.axis % 3] = self.cells_of_row(longest / parts as f32);
+                // A little wider, so that a length that this divides needs no cell more for its margins.
+                cells[self.axis % 3] = self.cells_of_row((1.0 + 3.0 * MARGIN) * longest / parts as f32);
             }
             cells
         })
@@ -143,25 +154,41 @@ fn cells_of(length: f32, width: f32) -> u32 {
     libm::ceilf(length / width + 2.0 * MARGIN) as u32
 }
 
-/// Gives nodes that elements connect the same number, counted from zero by their first nodes and at most [`MOST`] - 1;
-/// zero to nodes of no element. How many bodies there are.
+/// The box to which a point is nearest.
+fn nearest<'a>(boxes: impl Iterator<Item = &'a ([f32; 3], [f32; 3])>, point: &[f32; 3]) -> usize {
+    let distance = |(low, size): &([f32; 3], [f32; 3])| {
+        [0, 1, 2].map(|axis| (low[axis] - point[axis]).max(point[axis] - low[axis] - size[axis]).max(0.0))
+    };
+    let squares = boxes.map(|each| distance(each).into_iter().fold(0.0, |sum, along| sum + along * along));
+    squares
+        .enumerate()
+        .fold((0, f32::INFINITY), |best, (body, square)| if square < best.1 { (body, square) } else { best })
+        .0
+}
+
+/// Gives nodes that elements connect the same number, counted from zero by their first nodes and at most [`MOST`] - 1, and
+/// others [`NONE`]. How many bodies there are.
 fn number_bodies<M>(scene: SceneView<'_, M>, labels: &mut [u32]) -> usize {
     // A forest: each node names one that is no later, and a root itself.
-    for (label, node) in labels.iter_mut().zip(0..) {
-        *label = node;
-    }
+    labels.fill(NONE);
     for (tile, lane) in scene.places() {
-        for corner in 1..4 {
-            unite(labels, tile.node(0, lane), tile.node(corner, lane));
+        for corner in 0..4 {
+            let node = tile.node(corner, lane);
+            if let Some(label) = labels.get_mut(node).filter(|label| **label == NONE) {
+                *label = node as u32;
+            }
+            unite(labels, tile.node(0, lane), node);
         }
     }
     let mut bodies = 0;
     for node in 0..labels.len() {
-        let named = labels.get(node).map_or(node, |&label| label as usize);
+        let named = labels.get(node).map_or(NONE, |&label| label) as usize;
+        if named == NONE as usize {
+            continue;
+        }
         // Earlier nodes have their numbers.
         let number = match labels.get(named) {
             Some(&number) if named != node => number,
-            _ if scene.is_alone(node) => 0,
             _ => {
                 bodies += 1;
                 (bodies - 1).min(MOST - 1) as u32

@@ -155,9 +155,10 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, belo
 fn grid_below<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, below: usize) -> Grid {
     let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
     let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
-    let least = layout.size().map(|size| LEAST_SPACING * edge / size);
     let (mut best, most) = (Grid::default(), most_functions(scene.element_count()));
     for cells in (1..64).flat_map(|parts| layout.near_cubic(parts)) {
+        let Some(size) = layout.box_of(cells) else { continue };
+        let least = size.map(|size| LEAST_SPACING * edge / size);
         if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
             continue;
         }

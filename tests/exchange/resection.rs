@@ -7,7 +7,7 @@ use supple::contact::{Instrument, Pose, Shape};
 use supple::loads::Loads;
 use supple::mesh::{Mesh, Winding};
 use supple::scene::FixedScene;
-use supple::state::FixedState;
+use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
 use supple::tled;
 
@@ -132,6 +132,38 @@ fn the_end_is_that_of_a_mesh_without_the_elements() {
             println!("{name}: {:.4} of {:.1} mm, {alone} nodes alone", 1e3 * off, 1e3 * moved);
             assert!(alone > 10 && off < 0.004 * moved && moved > 0.003, "{name}");
         }
+    }
+}
+
+/// One lattice over both would hold the piece back and pull the rest along.
+#[test]
+fn a_piece_that_is_cut_off_falls_while_the_rest_swings_back() {
+    const STEP: f32 = 1e-3;
+    let layer = elements_where(|[_, _, z]| z > 0.06 && z < 0.0675);
+    for element in ELEMENTS {
+        let [long, exact] = [(long(), Some(STEP)), (Method::Exact, None)].map(|(method, step)| {
+            let mut body = bar(element).with(Settings { step, ..settings(method, 5.0) });
+            body.gravity = [0.0, 0.0, 2.0];
+            body.advance(0.1).unwrap();
+            body.remove(&layer).unwrap();
+            let before = body.displacements().to_vec();
+            body.advance(0.1).unwrap();
+            (before, body.displacements().to_vec())
+        });
+        // Mean distance over the nodes of a part, mm.
+        let mean = |is: &dyn Fn(f32) -> bool, a: &[NodeVector], b: &[NodeVector]| {
+            let vector = |of: &NodeVector| glam::Vec3::from(of.to_array()).as_dvec3();
+            let part = BAR.points().zip(a.iter().zip(b)).filter(|(point, _)| is(point[2]));
+            let far: Vec<_> = part.map(|(_, (a, b))| 1e3 * (vector(a) - vector(b)).length()).collect();
+            far.iter().sum::<f64>() / far.len() as f64
+        };
+        let (piece, rest): (&dyn Fn(f32) -> bool, &dyn Fn(f32) -> bool) = (&|z| z > 0.067, &|z| z < 0.061);
+        let [fell, swung] = [piece, rest].map(|is| mean(is, &exact.0, &exact.1));
+        let [of_piece, of_rest] = [piece, rest].map(|is| mean(is, &long.1, &exact.1));
+        println!(
+            "{element:?}: the piece fell by {fell:.1} mm, {of_piece:.2} off; the rest by {swung:.1} mm, {of_rest:.2} off"
+        );
+        assert!(fell > 10.0 && of_piece < 0.03 * fell && of_rest < 0.1 * swung);
     }
 }
 
