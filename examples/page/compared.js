@@ -2,7 +2,7 @@
 // far apart the middle of the tumour is in both is the error at the target. Metres.
 
 import { Library } from "../../src/javascript/library.js";
-import { FRAME, Simulation } from "./simulation.js";
+import { Simulation } from "./simulation.js";
 
 const apart = (a, b) => Math.hypot(...a.map((metre, axis) => metre - b[axis]));
 
@@ -74,9 +74,7 @@ export class Compared {
         // What one of them refused is taken from both.
         if (shown.refusal?.name && !this.shown.tool.kind) this.exact.tool.remove();
         if (exact?.refusal?.name && !this.exact.tool.kind) this.shown.tool.remove();
-        // After a refusal they are not at the same time, until the next frame.
-        const together = exact && !exact.halted && Math.abs(shown.time - exact.time) < 1e-3 * FRAME;
-        const error = together ? apart(shown.target, exact.target) : null;
+        const error = exact && !exact.halted ? apart(shown.target, exact.target) : null;
         this.worst = Math.max(this.worst, error ?? 0);
         return {
             ...shown,

@@ -105,9 +105,8 @@ export class Simulation extends Body {
         } catch (error) {
             refusal = refused(error);
             report = { status: refusal.name, text: refusal.text, steps: error.steps, estimate: null };
-            // The body goes on without the instrument, and the next frame makes up for this one. Anything else needs a
-            // reset.
-            if (refusal.name === "SUPPLE_E_DIVERGED_INSTRUMENT") this.tool.remove();
+            // The body goes on without the instrument, to the end of the frame. Anything else needs a reset.
+            if (refusal.name === "SUPPLE_E_DIVERGED_INSTRUMENT") this.#withoutTool(before + FRAME);
             else this.halted = refusal;
         }
         return {
@@ -121,6 +120,15 @@ export class Simulation extends Body {
             refusal,
             halted: this.halted !== null,
         };
+    }
+
+    #withoutTool(end) {
+        this.tool.remove();
+        try {
+            this.advance(end - this.time());
+        } catch (error) {
+            this.halted = refused(error);
+        }
     }
 
     #standing() {

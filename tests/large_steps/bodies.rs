@@ -60,17 +60,17 @@ fn pulled<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, count: u32
 fn a_body_moves_as_if_it_were_alone() {
     fn check<M: ElementMaterial>(name: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
         for multiple in [10.0, 20.0] {
-            let [alone, beside, in_many] = [1, 2, 5].map(|count| pulled(&material, count, multiple));
+            let [alone, next, in_many] = [1, 2, 5].map(|count| pulled(&material, count, multiple));
             println!(
-                "{name}, {multiple}x: {:.3} mm off alone, {:.3} with one beside it, {:.3} with four, of {:.2} mm; others move {:.1e} mm",
+                "{name}, {multiple}x: {:.3} mm off alone, {:.3} with one next to it, {:.3} with four, of {:.2} mm; others move {:.1e} mm",
                 1e3 * alone[0],
-                1e3 * beside[0],
+                1e3 * next[0],
                 1e3 * in_many[0],
                 1e3 * alone[1],
-                1e3 * beside[2].max(in_many[2])
+                1e3 * next[2].max(in_many[2])
             );
             assert!(alone[1] > 2e-3);
-            for several in [beside, in_many] {
+            for several in [next, in_many] {
                 // All share the functions of one lattice, so each has fewer.
                 assert!(several[0] < alone[0].max(0.3 * alone[1]) && several[2] == 0.0, "{several:?}");
             }
