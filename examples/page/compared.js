@@ -3,8 +3,7 @@
 
 import { Library } from "../../src/javascript/library.js";
 import { Simulation } from "./simulation.js";
-
-const apart = (a, b) => Math.hypot(...a.map((metre, axis) => metre - b[axis]));
+import { apart } from "./vectors.js";
 
 export class Compared {
     /**

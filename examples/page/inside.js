@@ -1,11 +1,11 @@
 // Tumour and vessels in the liver: points of their surfaces, and the middle of the tumour, which is the target. All
 // follow the tissue: located once in the mesh at rest, then moved with its nodes by supple_follow. Metres.
 
+import { length, plus } from "./vectors.js";
+
 const AROUND = 16; // points of a ring
 const APART = 0.003; // m, between rings of a vessel
 const RINGS = 11; // of the tumour, without its ends
-
-const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
 
 export class Inside {
     /** @param {import("./simulation.js").Simulation} simulation, @param liver its mesh, tumour and vessels */
@@ -59,7 +59,7 @@ export class Inside {
     /** Points along a vessel, as far as it is in the liver. */
     #within({ from, to }) {
         const way = plus(to, from, -1);
-        const parts = Math.ceil(Math.hypot(...way) / APART);
+        const parts = Math.ceil(length(way) / APART);
         const line = Array.from({ length: parts + 1 }, (_, part) => plus(from, way, part / parts));
         const { located } = this.#followed(line);
         const { size } = this.library.layout("supple_followed_point");
@@ -103,7 +103,7 @@ const tube = (middles, radius) =>
 function rings(middles, radii) {
     const along = plus(middles.at(-1), middles[0], -1);
     const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    const unit = (a) => a.map((value) => value / Math.hypot(...a));
+    const unit = (a) => a.map((value) => value / length(a));
     const side = unit(cross(along, Math.abs(along[0]) < Math.abs(along[1]) ? [1, 0, 0] : [0, 1, 0]));
     const other = unit(cross(along, side));
     const points = middles.flatMap((middle, ring) =>

@@ -3,6 +3,7 @@
 // anywhere it is taken away. Metres.
 
 import { FRAME } from "./simulation.js";
+import { apart, length, plus } from "./vectors.js";
 
 const MOST = 8;
 const NODES = 64; // of a pin
@@ -11,9 +12,6 @@ const STIFFNESS = 300; // N/m
 const NEAR = 0.008; // m: a pin that is touched
 const SPEED = 0.1; // m/s
 const STILL = 0.001; // m: led less than that it was not led
-
-const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
-const length = (vector) => Math.hypot(...vector);
 
 export class Pins {
     /**
@@ -69,7 +67,7 @@ export class Pins {
                 places.pull,
                 simulation.places.error,
             );
-            if (status < 0) return { name: library.name(status), text: library.text(status) };
+            if (status < 0) return simulation.refusal(status);
         }
         library.call("supple_set_pulls", loads, this.pins.length > 0 ? this.pulls : 0);
         return this.#aim(
@@ -91,7 +89,7 @@ export class Pins {
             to,
             simulation.places.error,
         );
-        return status < 0 ? { name: library.name(status), text: library.text(status) } : null;
+        return status < 0 ? simulation.refusal(status) : null;
     }
 
     /**
@@ -99,7 +97,7 @@ export class Pins {
      * library refused, or null.
      */
     begin(hit, positions) {
-        const at = this.pins.findIndex(({ position }) => length(plus(position, hit, -1)) < NEAR);
+        const at = this.pins.findIndex(({ position }) => apart(position, hit) < NEAR);
         if (at >= 0) {
             this.led = { pin: this.pins[at], origin: this.pins[at].position, is_new: false, way: 0 };
             return null;
@@ -122,8 +120,8 @@ export class Pins {
     }
 
     #nearest(hit, positions) {
-        const apart = (node) => length(plus(Array.from(positions.subarray(3 * node, 3 * node + 3)), hit, -1));
-        return this.surface.reduce((best, node) => (apart(node) < apart(best) ? node : best), this.surface[0]);
+        const far = (node) => apart(Array.from(positions.subarray(3 * node, 3 * node + 3)), hit);
+        return this.surface.reduce((best, node) => (far(node) < far(best) ? node : best), this.surface[0]);
     }
 
     /** The pointer has moved by this vector since it touched. */

@@ -31,6 +31,7 @@ export class Simulation extends Body {
         this.inside = new Inside(this, liver);
         this.leading = this.tool;
         this.setGravity(liver.gravity);
+        this.savedBytes = library.functions.supple_saved_size(this.nodes);
         this.saved = hanging ? library.copy(hanging) : this.#hang(liver.settled);
         this.setMethod("long", TOLERANCE);
         this.reset();
@@ -40,19 +41,14 @@ export class Simulation extends Body {
 
     #hang(metres) {
         this.settle(metres);
-        const bytes = this.library.functions.supple_saved_size(this.nodes);
-        const place = this.library.room(bytes);
-        this.library.call("supple_save", this.state, place, bytes);
+        const place = this.library.room(this.savedBytes);
+        this.library.call("supple_save", this.state, place, this.savedBytes);
         return place;
     }
 
     /** The state in which it hangs, for another one. */
     hanging() {
-        return new Uint8Array(
-            this.library.memory.buffer,
-            this.saved,
-            this.library.functions.supple_saved_size(this.nodes),
-        ).slice();
+        return new Uint8Array(this.library.memory.buffer, this.saved, this.savedBytes).slice();
     }
 
     /** From now on these steps. `tolerance` (m) is that of automatic steps, and what the guard of long ones allows. */
@@ -69,12 +65,7 @@ export class Simulation extends Body {
 
     /** As it hangs, at time zero, without an instrument. */
     reset() {
-        this.library.call(
-            "supple_restore",
-            this.state,
-            this.saved,
-            this.library.functions.supple_saved_size(this.nodes),
-        );
+        this.library.call("supple_restore", this.state, this.saved, this.savedBytes);
         this.tool.remove();
         this.pins.remove();
         this.breath.reset();
@@ -129,6 +120,11 @@ export class Simulation extends Body {
         } catch (error) {
             this.halted = refused(error);
         }
+    }
+
+    /** What the page says of a status. */
+    refusal(status) {
+        return { name: this.library.name(status), text: this.library.text(status) };
     }
 
     #standing() {

@@ -3,6 +3,7 @@
 // away when it is let go. Metres.
 
 import { FRAME } from "./simulation.js";
+import { length, plus } from "./vectors.js";
 
 const SPEED = 0.1; // m/s
 const REACH = 0.025; // m, how far from where it began the pointer leads it
@@ -13,7 +14,6 @@ const SLIP = 5; // N: where they hold more they slip
 const FORCEPS = 0.004; // m, their radius
 const CLEARANCE = { press: 0.001, pull: 0.003 }; // m, between the instrument and the tissue before it touches
 
-const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 export class Tool {
@@ -76,7 +76,7 @@ export class Tool {
         }
         if (status < 0) {
             this.remove();
-            return { name: library.name(status), text: library.text(status) };
+            return this.simulation.refusal(status);
         }
         this.kind = kind;
         this.phase = "led";
@@ -102,8 +102,8 @@ export class Tool {
     /** The pointer has moved by this vector since it touched. */
     lead(way) {
         if (this.kind === null || this.phase !== "led") return;
-        const length = Math.hypot(...way);
-        this.target = plus(this.origin, way, length > REACH ? REACH / length : 1);
+        const far = length(way);
+        this.target = plus(this.origin, way, far > REACH ? REACH / far : 1);
     }
 
     /** Lets the tissue go, and withdraws towards the camera. */
@@ -128,9 +128,8 @@ export class Tool {
         if (this.kind === null) return null;
         const { library, places } = this;
         const way = plus(this.target, this.position, -1);
-        const length = Math.hypot(...way);
-        const most = SPEED * FRAME;
-        const position = length > most ? plus(this.position, way, most / length) : this.target;
+        const [far, most] = [length(way), SPEED * FRAME];
+        const position = far > most ? plus(this.position, way, most / far) : this.target;
         library.write(places.pose, "supple_pose", { position, rotation: [0, 0, 0, 0] });
         const status = library.functions.supple_move_instrument(
             this.contact,
@@ -142,7 +141,7 @@ export class Tool {
         );
         if (status < 0) {
             this.target = this.position;
-            return { name: library.name(status), text: library.text(status) };
+            return this.simulation.refusal(status);
         }
         this.position = position;
         return null;
@@ -163,7 +162,7 @@ export class Tool {
             position: this.position,
             radius: this.radii[this.kind],
             held: this.held,
-            force: Math.hypot(...force),
+            force: length(force),
             contacts,
             depth,
         };
