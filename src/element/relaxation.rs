@@ -101,19 +101,26 @@ impl<'a> Relaxing<'a> {
         Self { series, alike, listed, part, table: table.as_ptr().addr(), before, after, own }
     }
 
-    /// Numbers of the tissues of a vector of elements.
+    /// The tissues of a vector of elements.
     #[inline(always)]
-    fn numbers<R: Real, const N: usize>(
-        &self,
-        element: impl Fn(usize) -> usize,
-        of: impl Fn(&OfTissue) -> [f32; N],
-    ) -> [R; N] {
+    fn tissues<R: Real>(&self, element: impl Fn(usize) -> usize) -> [usize; TILE] {
+        let mut tissues = [0; TILE];
+        if !self.alike {
+            for (lane, tissue) in tissues.iter_mut().enumerate().take(R::COUNT) {
+                *tissue = self.series.tissue(element(lane));
+            }
+        }
+        tissues
+    }
+
+    /// Numbers of each of these tissues.
+    #[inline(always)]
+    fn numbers<R: Real, const N: usize>(&self, tissues: &[usize; TILE], of: impl Fn(&OfTissue) -> [f32; N]) -> [R; N] {
         if self.alike {
             return of(&self.listed[0]).map(R::splat);
         }
         let mut rows = [[0.0; TILE]; N];
-        for lane in 0..R::COUNT {
-            let tissue = self.series.tissue(element(lane));
+        for (lane, &tissue) in tissues.iter().enumerate().take(R::COUNT) {
             let numbers = match self.listed.get(tissue) {
                 Some(listed) => of(listed),
                 None => of(&self.not_listed(tissue)),
@@ -240,8 +247,9 @@ impl Relaxing<'_> {
         let tile = place_of(self.table, tile);
         let (part, terms) = (R::splat(self.part), self.series.terms.min(MOST_TERMS));
         let mut sum = [R::splat(0.0); COMPONENTS];
+        let tissues = self.tissues::<R>(element);
         for term in 0..terms {
-            let [share, at_step, over_step] = self.numbers::<R, 3>(&element, |of| of.terms[term % MOST_TERMS]);
+            let [share, at_step, over_step] = self.numbers::<R, 3>(&tissues, |of| of.terms[term % MOST_TERMS]);
             let rows = COMPONENTS * (terms * tile + term);
             let before: Option<&[_; COMPONENTS]> = self.before.get(rows..).and_then(|rows| rows.first_chunk());
             let own = rows.wrapping_sub(COMPONENTS * terms * self.own);
@@ -270,7 +278,7 @@ impl Relaxing<'_> {
     /// is never negative.
     #[inline(always)]
     pub(super) fn stabilising<R: Real>(&self, modulus: R, element: impl Fn(usize) -> usize) -> R {
-        let [share] = self.numbers::<R, 1>(element, |of| [of.stabilising]);
+        let [share] = self.numbers::<R, 1>(&self.tissues::<R>(element), |of| [of.stabilising]);
         modulus * share
     }
 

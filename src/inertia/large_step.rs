@@ -144,10 +144,7 @@ impl<'w> LargeModel<'w> {
         let is_apart = layout.bodies() > 1 && {
             let apart = match cells {
                 Cells::Suggested => largest(&layout, usize::MAX),
-                Cells::Given(cells) => {
-                    let functions = Lattice::functions_for(cells, &layout, scene.inertia).unwrap_or_default();
-                    Grid { cells, functions }
-                }
+                Cells::Given(_) => cells.grid_on(scene, &layout).unwrap_or_default(),
             };
             let is_possible = apart.functions > 0 && fits(&apart);
             if is_possible {

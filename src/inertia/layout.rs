@@ -160,10 +160,7 @@ fn nearest<'a>(boxes: impl Iterator<Item = &'a ([f32; 3], [f32; 3])>, point: &[f
         [0, 1, 2].map(|axis| (low[axis] - point[axis]).max(point[axis] - low[axis] - size[axis]).max(0.0))
     };
     let squares = boxes.map(|each| distance(each).into_iter().fold(0.0, |sum, along| sum + along * along));
-    squares
-        .enumerate()
-        .fold((0, f32::INFINITY), |best, (body, square)| if square < best.1 { (body, square) } else { best })
-        .0
+    squares.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(body, _)| body)
 }
 
 /// Gives nodes that elements connect the same number, counted from zero by their first nodes and at most [`MOST`] - 1, and
@@ -182,7 +179,7 @@ fn number_bodies<M>(scene: SceneView<'_, M>, labels: &mut [u32]) -> usize {
     }
     let mut bodies = 0;
     for node in 0..labels.len() {
-        let named = labels.get(node).map_or(NONE, |&label| label) as usize;
+        let named = labels.get(node).copied().unwrap_or(NONE) as usize;
         if named == NONE as usize {
             continue;
         }

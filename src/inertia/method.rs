@@ -55,10 +55,15 @@ impl<'w> Method<'w> {
 impl Cells {
     /// The lattice on a scene with these `points` (m).
     pub fn grid<M: Material>(self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
+        self.grid_on(scene, &Layout::one(points))
+    }
+
+    /// The same on nodes that may be set apart.
+    pub(super) fn grid_on<M>(self, scene: SceneView<'_, M>, layout: &Layout<'_>) -> Result<Grid, InertiaError> {
         match self {
-            Self::Suggested => Ok(largest_grid(scene, &Layout::one(points), usize::MAX)),
+            Self::Suggested => Ok(largest_grid(scene, layout, usize::MAX)),
             Self::Given(cells) => {
-                let functions = Lattice::functions_for(cells, &Layout::one(points), scene.inertia)?;
+                let functions = Lattice::functions_for(cells, layout, scene.inertia)?;
                 Ok(Grid { cells, functions })
             }
         }

@@ -63,11 +63,18 @@ impl Samples {
         let facts = |scene: &dyn TrainingScene| (scene.tissue(), scene.element(), scene.damping(), scene.step());
         let mut all = Self::default();
         for (number, (motion, scene)) in recipe.motion.iter().zip(scenes).enumerate() {
+            let other = || {
+                let must = "tissue, tetrahedra, damping, step or vertices are not those of the first motion";
+                Err(TrainError::refused("scene", format!("{:?}", motion.scene), must))
+            };
+            // Before any time is spent on it.
+            if facts(*scene) != facts(scenes[0]) {
+                return other();
+            }
             let seed = recipe.seed.wrapping_add(number as u64);
             let one = collect(*scene, recipe, motion, &mut Random(seed))?;
-            if number > 0 && (facts(*scene) != facts(scenes[0]) || one.vertices != all.vertices) {
-                let must = "tissue, tetrahedra, damping, step or vertices are not those of the first motion";
-                return Err(TrainError::refused("scene", format!("{:?}", motion.scene), must));
+            if number > 0 && one.vertices != all.vertices {
+                return other();
             }
             all.add(one);
         }
