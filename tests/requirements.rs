@@ -144,14 +144,17 @@ fn is_test(source: &str, name: &str) -> Result<(), String> {
     Err("there is no such function".into())
 }
 
-/// Whether a file of `tests/`, `CRATE.rs` or `CRATE/MODULE.rs`, belongs to a test crate of a package.
+/// Whether a file of `tests/` belongs to a test crate of a package: `CRATE.rs`, `CRATE/MODULE.rs`, or `PART/MODULE.rs`
+/// with the parts of tests/kernel.rs.
 fn is_compiled(file: &str, named_by: &dyn Fn(&str, &str) -> Result<(), String>) -> Result<(), String> {
     let stem = file.strip_suffix(".rs").unwrap_or(file);
     let (name, module) = stem.split_once('/').unwrap_or((stem, "main"));
-    if module != "main" {
-        named_by(&format!("tests/{name}/main.rs"), &format!("mod {module};"))?;
+    let is_part = named_by("tests/kernel.rs", &format!("mod {name};")).is_ok();
+    let (root, top) = if is_part { ("mod", "kernel") } else { ("main", name) };
+    if module != root && module != "main" {
+        named_by(&format!("tests/{name}/{root}.rs"), &format!("mod {module};"))?;
     }
-    let name = format!("name = \"{name}\"");
+    let name = format!("name = \"{top}\"");
     named_by("Cargo.toml", &name)
         .or_else(|_| named_by("src/bin/supple/Cargo.toml", &name))
         .or_else(|_| named_by("src/lab/Cargo.toml", &name))
@@ -173,8 +176,9 @@ fn every_requirement_has_a_test_or_says_why_not() {
 /// A repository of few files.
 fn small(file: &str) -> Option<String> {
     let text = match file {
-        "Cargo.toml" => "[[test]]\nname = \"physics\"\n#name = \"later\"\n",
-        "tests/physics/main.rs" => "mod bars;\n// mod old;\n",
+        "Cargo.toml" => "[[test]]\nname = \"kernel\"\n#name = \"later\"\n",
+        "tests/kernel.rs" => "mod physics;\n",
+        "tests/physics/mod.rs" => "mod bars;\n// mod old;\n",
         "tests/physics/bars.rs" => {
             "#[test]\n/// In words.\n#[cfg(any())]\nfn bends() {\n}\n#[test]\n#[ignore]\nfn breaks() {\n}\nfn helps() {\n}\n// fn gone() {\n"
         }
@@ -228,7 +232,7 @@ fn every_fault_of_a_table_is_told_with_its_line() {
         (page(&names("`tests/physics/bars.rs::gone`")), "there is no such function"),
         (page(&names("`tests/physics/bars.rs::helps`")), "the function is no test"),
         (page(&names("`tests/physics/bars.rs::breaks`")), "the test is ignored"),
-        (page(&names("`tests/physics/old.rs::adds`")), "tests/physics/main.rs does not run it"),
+        (page(&names("`tests/physics/old.rs::adds`")), "tests/physics/mod.rs does not run it"),
         (page(&names("`tests/later.rs::adds`")), "Cargo.toml does not run it"),
         (page(&names("`tests/capi/heap.c::frees`")), "there is no such function, or it is not called"),
         (page(&names("`tests/capi/heap.c::idle`")), "there is no such function, or it is not called"),

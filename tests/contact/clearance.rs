@@ -6,8 +6,8 @@ use supple::scene::Support;
 use supple::state::NodeVector;
 use supple::step::Step;
 
-use super::networks::uniform;
 use super::scene::Body;
+use crate::networks::uniform;
 
 const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [5, 5, 10] };
 

@@ -9,8 +9,8 @@ use supple::state::NodeVector;
 use supple::step::{Cause, Status, Step};
 use supple::tled;
 
-use super::networks::uniform;
 use super::scene::{Body, compared};
+use crate::networks::uniform;
 
 /// Who takes the steps.
 enum Taker {

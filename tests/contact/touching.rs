@@ -8,8 +8,8 @@ use supple::scene::Support;
 use supple::state::NodeVector;
 use supple::step::{Cause, Status};
 
-use super::networks::uniform;
 use super::scene::{Body, compared};
+use crate::networks::uniform;
 
 const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [3, 3, 6] };
 

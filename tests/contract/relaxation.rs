@@ -11,7 +11,7 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{Cause, Divergence, Status, Step};
 use supple::tled;
 
-use crate::parts::same_bits_in_parts;
+use crate::contract::parts::same_bits_in_parts;
 use crate::support::{Body, EXP, NEO, bits, bound, largest_distance, to_f64};
 
 const ELEMENTS: [Element; 3] = Element::ALL;

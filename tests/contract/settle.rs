@@ -14,7 +14,7 @@ use supple::state::NodeVector;
 use supple::step::{MOST_PARTS, Status};
 use supple::tled::{self, DisplacementError, SettleError};
 
-use crate::parts::Backwards;
+use crate::contract::parts::Backwards;
 use crate::support::{Body, NEO, bits};
 
 const ELEMENTS: [Element; 3] = [Element::Linear, Element::NodalPressure, Element::NodalStrain];

@@ -10,9 +10,10 @@ use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 
+use crate::large_steps::prepared;
+use crate::support;
 use crate::support::bodies::{held, torsion};
 use crate::support::{Body, EXP, bound, mean_distance, rest_of, tissue, to_f64};
-use crate::{prepared, support};
 
 type Scene = VecScene<VecMaterial>;
 type VecAdaptive = Adaptive<'static, Vec<NodeVector>>;

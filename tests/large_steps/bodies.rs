@@ -6,9 +6,9 @@ use supple::material::{AnyLaw, NeoHookean, NodalPressure, NodalStrain, Tissue};
 use supple::scene::Support;
 use supple::step::Step;
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::Body;
 use crate::support::{largest, mean_distance, rest_of, run, tissue, to_f64};
-use crate::{limit, prepared};
 
 const LAW: NeoHookean = NeoHookean { c: 700.0, d: 6_700.0 };
 /// Of a cube, and between two, m.

@@ -7,9 +7,10 @@ use supple::state::VecState;
 use supple::step::{Status, Step};
 use supple::tled;
 
+use crate::large_steps::{GAIN, prepared};
+use crate::networks;
 use crate::support::bodies::{corner_torsion, held, small_bar};
 use crate::support::{Body, EXP, NEO, bits, bound, mean_distance, rest_of, tissue, to_f64};
-use crate::{GAIN, networks, prepared};
 
 #[test]
 fn networks_of_another_shape_are_refused() {

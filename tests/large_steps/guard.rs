@@ -9,9 +9,10 @@ use supple::scene::VecScene;
 use supple::state::VecState;
 use supple::step::{Status, Step};
 
+use crate::large_steps::VecLargeStep;
+use crate::support;
 use crate::support::bodies::{held, torsion};
 use crate::support::{Body, EXP, bound, mean_distance, rest_of, tissue, to_f64};
-use crate::{VecLargeStep, support};
 
 type Scene = VecScene<VecMaterial>;
 type VecGuard = Guard<Vec<supple::state::NodeVector>>;

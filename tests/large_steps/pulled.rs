@@ -6,9 +6,9 @@ use supple::material::{AnyLaw, NeoHookean, NodalStrain, Tissue};
 use supple::scene::{Axes, Support};
 use supple::step::Step;
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::Body;
 use crate::support::{mean_distance, rest_of, run, tissue, to_f64};
-use crate::{limit, prepared};
 
 /// A bar with one end that moves.
 struct Pulled {

@@ -10,9 +10,9 @@ use supple::state::VecState;
 use supple::step::Step;
 use supple::tled;
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::Body;
 use crate::support::{rest_of, run, tissue};
-use crate::{limit, prepared};
 
 /// s
 const FRAME: f32 = 1.0 / 60.0;

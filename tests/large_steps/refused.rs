@@ -7,9 +7,9 @@ use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::{held, small_bar};
 use crate::support::{Body, NEO, bits, displaced, rest_of, tissue};
-use crate::{limit, prepared};
 
 fn given(cells: [u32; 3]) -> Method<'static> {
     Method::new(Cells::Given(cells))

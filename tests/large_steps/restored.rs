@@ -12,10 +12,10 @@ use supple::state::{NodeVector, Progress, StateView};
 use supple::step::{Status, Step};
 use supple::tled;
 
+use crate::large_steps::{VecLargeStep, limit};
 use crate::reference::Random;
 use crate::support::bodies::held;
 use crate::support::{Body, NEO, tissue};
-use crate::{VecLargeStep, limit};
 
 type VecGuard = Guard<Vec<NodeVector>>;
 

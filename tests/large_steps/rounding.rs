@@ -14,9 +14,10 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 
+use crate::large_steps::prepared;
 use crate::networks::{Memory, described};
+use crate::reference;
 use crate::support::{Body, rest_of, run, tissue, to_f64};
-use crate::{prepared, reference};
 
 /// A fragment of 4 mm, as stiff as cartilage: its critical step is some microseconds.
 const STIFF: NeoHookean = NeoHookean { c: 2e6, d: 2e8 };
@@ -170,7 +171,7 @@ fn a_fragment_under_a_small_force_has_the_energy_of_its_work() {
         .map(|node| supple::loads::NodalForce { node, newton: [2.2e-8, 0.0, 0.0], ramp: 0.0 })
         .collect();
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
-    let step = Step::unchecked(0.9 * crate::limit(&scene), 0.0).unwrap();
+    let step = Step::unchecked(0.9 * crate::large_steps::limit(&scene), 0.0).unwrap();
     let mut state = rest_of(&scene);
     let steps = (1.7 / step.seconds()) as u64;
     run(&scene, &loads, &mut state, &step, steps);

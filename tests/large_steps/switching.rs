@@ -6,9 +6,9 @@ use supple::state::VecState;
 use supple::step::{Status, Step};
 use supple::tled;
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::{held, small_bar, torsion};
 use crate::support::{Body, NEO, largest_distance, mean_distance, rest_of, tissue, to_f64};
-use crate::{limit, prepared};
 
 /// 40 long steps, 200 exact ones, 40 long ones: the exact motion is followed as well as by long steps alone.
 #[test]

@@ -9,9 +9,9 @@ use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
 use supple::step::{Status, Step};
 
+use crate::large_steps::{limit, prepared};
 use crate::support::bodies::Body;
 use crate::support::{fixed, mean_distance, rest_of, run, tissue, to_f64};
-use crate::{limit, prepared};
 
 type Vector = [f64; 3];
 

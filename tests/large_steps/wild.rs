@@ -11,10 +11,10 @@ use supple::material::{AnyLaw, Law, NodalStrain, Tissue};
 use supple::scene::{Axes, Support};
 use supple::step::Step;
 
+use crate::large_steps::{GAIN, limit, prepared};
 use crate::reference::Random;
 use crate::support::bodies::held;
 use crate::support::{Body, EXP, NEO, largest, rest_of, tissue, to_f64};
-use crate::{GAIN, limit, prepared};
 
 /// A bar of 2 x 2 x 4 cm whose layers grow along all axes and whose nodes are shaken as far as every element stays
 /// above a thousandth of what its cell would have. Drawn again if its elements' volumes hardly differ.

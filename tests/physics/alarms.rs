@@ -373,7 +373,7 @@ fn sudden_torsion_of_the_papers_bar() {
     let step = Step::unchecked(3e-5, 5.0).unwrap();
     let mut state = rest_of(&scene);
     let (mut limited, mut shortest) = (0, f32::INFINITY);
-    for n in 0..33_333 {
+    for n in 0..10_000 {
         match tled::step(&scene, &loads, &mut state, &step) {
             Status::Diverged(divergence) => panic!("false alarm at step {n}: {divergence}"),
             Status::Limited { .. } => limited += 1,

@@ -8,7 +8,7 @@ use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 
-use crate::nodal_elements::{noise, same_bits_in_parts_from};
+use crate::physics::nodal_elements::{noise, same_bits_in_parts_from};
 use crate::reference::tensor::determinant;
 use crate::support::{Body, bits, bound, displaced, fixed, rest_of, tissue, widened};
 

@@ -4,8 +4,8 @@ use supple::material::{AnyLaw, Directions, Element, Exponential, Fibres, Prony, 
 use supple::scene::VecScene;
 use supple::tled;
 
+use crate::physics::relaxation::Specimen;
 use crate::reference::tensor::{Mat3, determinant, from_fn, inverse, max_abs, product, transpose};
-use crate::relaxation::Specimen;
 use crate::support::{Body, DENSITY, bound, displaced, forces, largest_distance, to_f32};
 
 /// Constants of Holzapfel & Ogden 2009, table 1, for the shear of pig myocardium (Pa): `a`, `b`, then those of fibres,

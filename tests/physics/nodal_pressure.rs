@@ -4,7 +4,7 @@
 use supple::material::{Exponential, Law, NeoHookean, NodalPressure};
 use supple::tled;
 
-use crate::nodal_elements::{self, Definition, noise, norm_where};
+use crate::physics::nodal_elements::{self, Definition, noise, norm_where};
 use crate::support::bodies::{held, small_bar};
 use crate::support::{self, Body, displaced, forces, largest_distance, norm, reference_law, regions, rest_of, tissue};
 

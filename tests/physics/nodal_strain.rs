@@ -6,7 +6,7 @@ use supple::material::{Exponential, Law, NeoHookean, NodalStrain};
 use supple::step::{Status, Step};
 use supple::tled;
 
-use crate::nodal_elements::{self, Definition};
+use crate::physics::nodal_elements::{self, Definition};
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::nodal_strain::{energy, forces, least_nodal_ratio};
 use crate::support::bodies::{held, small_bar};

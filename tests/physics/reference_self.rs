@@ -1,5 +1,5 @@
 //! Tests of the float64 reference itself: the judge is judged against the definitions. Each prints its figure
-//! (`cargo test --test physics reference_self -- --nocapture`).
+//! (`cargo test --test kernel physics::reference_self -- --nocapture`).
 
 use std::time::Instant;
 

@@ -2,13 +2,6 @@
 //! operator that they apply is symmetric, positive and bounded, and no mesh, support, load or damping makes them
 //! diverge.
 
-#[path = "../support/networks.rs"]
-mod networks;
-#[path = "../reference/mod.rs"]
-mod reference;
-#[path = "../support/mod.rs"]
-mod support;
-
 mod adaptive;
 mod bodies;
 mod damper;
@@ -22,12 +15,17 @@ mod switching;
 mod turning;
 mod wild;
 
+use crate::reference::dense::{Matrix, cholesky, congruent, eigenvalues, symmetric_part, zeros};
+use crate::reference::nodal_pressure::Tissues;
+use crate::reference::nodal_strain;
+use crate::reference::tensor::{cross, difference, dot};
+use crate::reference::{Random, tangent_product};
+use crate::support::bodies::{corner_torsion, held, small_bar, torsion};
+use crate::support::{
+    Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64,
+};
 use crate::support::{reference_law, regions};
-use reference::dense::{Matrix, cholesky, congruent, eigenvalues, symmetric_part, zeros};
-use reference::nodal_pressure::Tissues;
-use reference::nodal_strain;
-use reference::tensor::{cross, difference, dot};
-use reference::{Random, tangent_product};
+use crate::{networks, reference, support};
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
@@ -36,8 +34,6 @@ use supple::scene::{Axes, Support, VecScene};
 use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{EnergyBalance, Status, Step};
 use supple::tled;
-use support::bodies::{corner_torsion, held, small_bar, torsion};
-use support::{Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64};
 
 type VecLargeStep = LargeStep<'static, Vec<NodeVector>>;
 

@@ -1,9 +1,6 @@
 //! Instruments that touch tissue: against closed forms, conservation of momentum, exact steps, and instruments that
 //! nobody sane would move like this.
 
-#[path = "../support/networks.rs"]
-mod networks;
-
 mod clearance;
 mod closed_forms;
 mod fields;

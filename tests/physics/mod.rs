@@ -1,11 +1,6 @@
 //! The exact step against closed forms, theory and the float64 reference, which is itself tested against its
 //! definitions.
 
-#[path = "../reference/mod.rs"]
-mod reference;
-#[path = "../support/mod.rs"]
-mod support;
-
 #[cfg(feature = "slow-tests")]
 mod against_reference;
 mod alarms;
