@@ -27,7 +27,7 @@ struct Body {
     scene: VecScene<VecMaterial>,
     state: VecState,
     step: Step,
-    long: Option<LargeStep<'static, Vec<NodeVector>>>,
+    long: Option<LargeStep<Vec<NodeVector>>>,
 }
 
 impl Body {

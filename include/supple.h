@@ -1432,7 +1432,7 @@ typedef struct {
 
 /**
  * What steps beyond the critical one need. Inertia is raised where they would be unstable, smooth motion keeps its true
- * inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
+ * inertia through a coarse lattice, and what the lattice does not carry is damped.
  */
 typedef struct {
     /**
@@ -1456,15 +1456,6 @@ typedef struct {
      * Cells of the lattice along x, y, z; zeros: chosen for the scene.
      */
     uint32_t cells[3];
-    /**
-     * NULL: the damper that is part of the library. Otherwise the weight file of another one, at a multiple of 4 bytes.
-     * It is used where it is and must stay.
-     */
-    const void *weights;
-    /**
-     * Its bytes; 0 with NULL.
-     */
-    size_t weights_bytes;
 } supple_large_config;
 
 /**
@@ -1639,8 +1630,8 @@ typedef struct {
      */
     supple_surface surface;
     /**
-     * Of learned steps the weight file, at a multiple of 4 bytes, better of 64; of others NULL, or that of another
-     * damper than the library's own. It is used where it is and must stay.
+     * Of learned steps the weight file, at a multiple of 4 bytes, better of 64. It is used where it is and must stay.
+     * Others do not read it.
      */
     const void *weights;
     /**

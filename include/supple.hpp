@@ -778,7 +778,6 @@ struct large_steps {
     float seconds = 0.0f;                    // length of a step, s
     float damping = 0.0f;                    // proportional to mass, 1/s
     std::array<std::uint32_t, 3> cells = {}; // of the lattice along x, y, z; zeros: chosen for the scene
-    bytes weights = {};                      // of another damper than the library's own; not copied: they must stay
 };
 
 namespace detail {
@@ -788,8 +787,6 @@ inline supple_large_config config_of(const large_steps &steps) noexcept {
     made.seconds = steps.seconds;
     made.damping = steps.damping;
     for (std::size_t axis = 0; axis < 3; axis++) made.cells[axis] = steps.cells[axis];
-    made.weights = steps.weights.data();
-    made.weights_bytes = steps.weights.size();
     return made;
 }
 
@@ -1332,7 +1329,7 @@ struct settings : supple_settings {
         touchable(nodes, {{}, {room.data(), needed ? 3 * found.value : 0}}, grips_at_once);
         return told;
     }
-    // The file of a network: of learned steps, or of another damper than the library's own; not copied: it must stay.
+    // The file of the network of learned steps; not copied: it must stay.
     settings &use_weights(supple::bytes file) noexcept {
         weights = file.data();
         weights_bytes = file.size();

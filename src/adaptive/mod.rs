@@ -43,7 +43,7 @@ pub struct Request {
 
 /// Vectors of storage that adaptive steps of a method need on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(
-    method: &Method<'_>,
+    method: &Method,
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
@@ -75,18 +75,18 @@ pub(crate) struct Chooser {
 
 /// Adaptive steps without their storage; they may be moved in memory.
 #[derive(Clone, Debug)]
-pub struct AdaptiveModel<'w> {
+pub struct AdaptiveModel {
     chooser: Chooser,
-    first: LargeModel<'w>,
-    second: LargeModel<'static>,
+    first: LargeModel,
+    second: LargeModel,
     watch: Watch,
 }
 
-impl<'w> AdaptiveModel<'w> {
+impl AdaptiveModel {
     /// Adaptive steps of this method from the present state, for a scene with these `points` (m) at rest. They begin as
     /// exact ones. `storage` of [`vectors_for`] vectors is overwritten.
     pub fn prepare<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         mut state: StateView<'_>,
@@ -134,7 +134,7 @@ impl<'w> AdaptiveModel<'w> {
     }
 
     /// The model with the storage in which it was prepared.
-    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> AdaptiveView<'a, 'w> {
+    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> AdaptiveView<'a> {
         let Self { chooser, first, second, watch } = self;
         AdaptiveView { chooser, first, second, watch, storage }
     }
@@ -142,7 +142,7 @@ impl<'w> AdaptiveModel<'w> {
 
 impl Chooser {
     pub(crate) fn new<M: ElementMaterial>(
-        method: &Method<'_>,
+        method: &Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         mut state: StateView<'_>,
@@ -241,10 +241,10 @@ pub(crate) struct StorageParts<'a> {
 
 /// Adaptive steps with borrowed storage.
 #[derive(Debug)]
-pub struct AdaptiveView<'a, 'w> {
+pub struct AdaptiveView<'a> {
     pub(crate) chooser: &'a mut Chooser,
-    pub(crate) first: &'a mut LargeModel<'w>,
-    pub(crate) second: &'a mut LargeModel<'static>,
+    pub(crate) first: &'a mut LargeModel,
+    pub(crate) second: &'a mut LargeModel,
     pub(crate) watch: &'a mut Watch,
     pub(crate) storage: &'a mut [NodeVector],
 }
@@ -272,7 +272,7 @@ impl Add for Taken {
     }
 }
 
-impl AdaptiveView<'_, '_> {
+impl AdaptiveView<'_> {
     /// See [`Adaptive::advance`].
     pub fn advance<M: ElementMaterial>(
         mut self,
@@ -467,15 +467,15 @@ impl AdaptiveView<'_, '_> {
 
 /// Adaptive steps with storage `S` of the caller.
 #[derive(Clone, Debug)]
-pub struct Adaptive<'w, S> {
-    model: AdaptiveModel<'w>,
+pub struct Adaptive<S> {
+    model: AdaptiveModel,
     storage: S,
 }
 
-impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
+impl<S: AsMut<[NodeVector]>> Adaptive<S> {
     /// See [`AdaptiveModel::prepare`].
     pub fn prepare<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
@@ -488,12 +488,12 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
 
     /// The model, for its estimate and the length of its steps.
     #[must_use]
-    pub const fn model(&self) -> &AdaptiveModel<'w> {
+    pub const fn model(&self) -> &AdaptiveModel {
         &self.model
     }
 
     /// The steps, whatever their storage.
-    pub fn view(&mut self) -> AdaptiveView<'_, 'w> {
+    pub fn view(&mut self) -> AdaptiveView<'_> {
         self.model.with_storage(self.storage.as_mut())
     }
 
@@ -513,10 +513,10 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
 }
 
 #[cfg(any(feature = "std", test))]
-impl<'w> Adaptive<'w, std::vec::Vec<NodeVector>> {
+impl Adaptive<std::vec::Vec<NodeVector>> {
     /// The same with storage from the heap.
     pub fn prepare_in_vec<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,

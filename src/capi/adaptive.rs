@@ -45,8 +45,8 @@ pub struct supple_adaptive {
     vectors: usize,
     chooser: Chooser,
     watch: Watch,
-    first: LargeModel<'static>,
-    second: LargeModel<'static>,
+    first: LargeModel,
+    second: LargeModel,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -107,7 +107,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
     adaptive: *mut *mut supple_adaptive,
     error: *mut supple_error,
 ) -> supple_status {
-    // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
+    // SAFETY: what the header asks of the caller.
     let init = || unsafe {
         let (open, adaptive) = (OpenScene::of(scene)?, place_for(adaptive)?);
         let mut state = opened_of(&open, state)?;
@@ -117,7 +117,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         }
         let longest = Step::unchecked(request.config.seconds, request.config.damping)?;
         let asked = Request { tolerance, longest };
-        let method = request.method()?;
+        let method = request.method();
         let vectors = vectors_of(&open, &request)?;
         let place = Place::new(memory, bytes, layout(vectors))?;
         let nodes = open.node_count() as u32;
@@ -125,7 +125,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let object = place.object::<supple_adaptive>();
         // Of 57 kB each: they are made where they stay, not on the stack.
         let [first, second] = [&raw mut (*object).first, &raw mut (*object).second]
-            .map(|model| &mut *model.cast::<MaybeUninit<LargeModel<'static>>>());
+            .map(|model| &mut *model.cast::<MaybeUninit<LargeModel>>());
         let points = request.points;
         let scene = open.view();
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
@@ -162,7 +162,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
 ///
 /// # Safety
 /// As at [`memory::change`].
-pub(super) unsafe fn opened<'a>(object: *mut supple_adaptive) -> Answer<AdaptiveView<'a, 'static>> {
+pub(super) unsafe fn opened<'a>(object: *mut supple_adaptive) -> Answer<AdaptiveView<'a>> {
     // SAFETY: the caller's promise.
     unsafe {
         let (supple_adaptive { vectors, chooser, watch, first, second, .. }, arrays) = memory::open(object)?;

@@ -64,7 +64,7 @@ pub struct supple_guard {
     /// In its storage.
     vectors: usize,
     watch: Watch,
-    second: LargeModel<'static>,
+    second: LargeModel,
 }
 
 // SAFETY: `repr(C)`, begins with a head.

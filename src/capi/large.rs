@@ -3,13 +3,12 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::inertia::{Cells, Damper, LargeModel, Method, vectors_for_lattice};
-use crate::mlp::Network;
+use crate::inertia::{Cells, LargeModel, Method, vectors_for_lattice};
 use crate::state::NodeVector;
 use crate::step::Step;
 
 use super::loads::{CallLoads, supple_loads};
-use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
+use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
@@ -24,7 +23,7 @@ const _: () = assert!(SUPPLE_LATTICE_POINTS as usize == crate::inertia::MAX_POIN
 const _: () = assert!(SUPPLE_LATTICE_FUNCTIONS as usize == crate::inertia::MAX_FUNCTIONS);
 
 /// What steps beyond the critical one need. Inertia is raised where they would be unstable, smooth motion keeps its true
-/// inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
+/// inertia through a coarse lattice, and what the lattice does not carry is damped.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_large_config {
@@ -39,11 +38,6 @@ pub struct supple_large_config {
     pub damping: f32,
     /// Cells of the lattice along x, y, z; zeros: chosen for the scene.
     pub cells: [u32; 3],
-    /// NULL: the damper that is part of the library. Otherwise the weight file of another one, at a multiple of 4 bytes.
-    /// It is used where it is and must stay.
-    pub weights: *const c_void,
-    /// Its bytes; 0 with NULL.
-    pub weights_bytes: usize,
 }
 
 /// Inertia for steps of one length, whose stiff part is computed anew where tissue deforms. One thread at a time. It may be copied with
@@ -54,7 +48,7 @@ pub struct supple_large {
     nodes: u32,
     /// In its storage.
     vectors: usize,
-    model: LargeModel<'static>,
+    model: LargeModel,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -97,19 +91,8 @@ impl<'a> LargeRequest<'a> {
         Ok(Self { config, points, cells, vectors })
     }
 
-    /// Not inlined: the preparation does without its stack.
-    ///
-    /// # Safety
-    /// As at [`supple_large_init`]: the weights stay.
-    #[inline(never)]
-    pub(super) unsafe fn method(&self) -> Answer<Method<'static>> {
-        let Self { config, cells, .. } = *self;
-        if config.weights.is_null() && config.weights_bytes == 0 {
-            return Ok(Method::new(cells));
-        }
-        // SAFETY: the caller's promise.
-        let weights = unsafe { lasting_bytes(config.weights, config.weights_bytes)? };
-        Ok(Method::with_damper(Damper::new(Network::parse(weights)?)?, cells))
+    pub(super) const fn method(&self) -> Method {
+        Method::new(self.cells)
     }
 }
 
@@ -161,7 +144,7 @@ pub unsafe extern "C" fn supple_large_init(
         let (open, large) = (OpenScene::of(scene)?, place_for(large)?);
         let state = opened_of(&open, state)?;
         let request = LargeRequest::of(&open, points, config)?;
-        let method = request.method()?;
+        let method = request.method();
         let step = Step::unchecked(request.config.seconds, request.config.damping)?;
         let LargeRequest { points, vectors, .. } = request;
         let place = Place::new(memory, bytes, layout(vectors))?;
@@ -185,9 +168,7 @@ pub unsafe extern "C" fn supple_large_init(
 ///
 /// # Safety
 /// As at [`memory::change`].
-pub(super) unsafe fn opened<'a>(
-    object: *mut supple_large,
-) -> Answer<(&'a mut LargeModel<'static>, &'a mut [NodeVector])> {
+pub(super) unsafe fn opened<'a>(object: *mut supple_large) -> Answer<(&'a mut LargeModel, &'a mut [NodeVector])> {
     // SAFETY: the caller's promise.
     unsafe {
         let (supple_large { vectors, model, .. }, arrays) = memory::open(object)?;

@@ -177,8 +177,6 @@ fn host(element: u32, network: &[u8], prony: &[supple_prony], fibres: &[supple_f
             seconds: 1e-3,
             damping: 20.0,
             cells: [1, 1, 1],
-            weights: null(),
-            weights_bytes: 0,
         };
         let (mut needed, mut large) = (0, null_mut());
         assert_eq!(supple_large_size(scene, points, &config, &mut needed, null_mut()), SUPPLE_OK);

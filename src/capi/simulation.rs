@@ -85,8 +85,8 @@ pub struct supple_settings {
     pub grips: u32,
     /// What instruments can touch; no nodes: there are none. Copied.
     pub surface: supple_surface,
-    /// Of learned steps the weight file, at a multiple of 4 bytes, better of 64; of others NULL, or that of another
-    /// damper than the library's own. It is used where it is and must stay.
+    /// Of learned steps the weight file, at a multiple of 4 bytes, better of 64. It is used where it is and must stay.
+    /// Others do not read it.
     pub weights: *const c_void,
     /// Its bytes; 0 with NULL.
     pub weights_bytes: usize,
@@ -422,8 +422,6 @@ impl supple_settings {
             seconds,
             damping: self.damping,
             cells: self.cells,
-            weights: self.weights,
-            weights_bytes: self.weights_bytes,
         }
     }
 
@@ -730,13 +728,7 @@ unsafe fn needed(
     // SAFETY: the caller's promise.
     unsafe {
         let large = settings.large(seconds_of(settings, critical));
-        let long = || {
-            let request = LargeRequest::of(open, points.as_ptr().cast(), &raw const large)?;
-            if !settings.weights.is_null() {
-                request.method()?;
-            }
-            Ok::<_, supple_error>(request)
-        };
+        let long = || LargeRequest::of(open, points.as_ptr().cast(), &raw const large);
         let pace = vectors_for_pace(nodes, open.view().memory_vectors()) * size_of::<NodeVector>();
         let exact = |damping| Pace::of(settings.given_seconds(), damping, critical).map(|_| pace);
         let steps = match settings.steps {

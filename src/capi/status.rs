@@ -4,7 +4,7 @@
 use core::ffi::{CStr, c_char};
 
 use crate::element::PatchRow;
-use crate::inertia::{DamperError, InertiaError};
+use crate::inertia::InertiaError;
 use crate::learned::LearnedError;
 use crate::loads::LoadError;
 use crate::mesh::MeshError;
@@ -394,13 +394,6 @@ impl From<LearnedError> for supple_error {
             LearnedError::StepRatio { exact, learned } => is(SUPPLE_E_STEP_RATIO).value(learned.into(), exact.into()),
             LearnedError::NotLed { .. } => is(SUPPLE_E_NOT_LED),
         }
-    }
-}
-
-impl From<DamperError> for supple_error {
-    fn from(error: DamperError) -> Self {
-        let DamperError::Shape { inputs, outputs } = error;
-        Self::from(SUPPLE_E_WEIGHTS_SHAPE).value(inputs as f64, outputs as f64)
     }
 }
 

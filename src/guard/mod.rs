@@ -1,5 +1,5 @@
-//! May a step be believed? A *second run* moves the same body by long steps without a damper, several times as long as
-//! those of the first run, under the same loads. The distance between the two runs estimates the error of the first:
+//! May a step be believed? A *second run* moves the same body by long steps, several times as long as those of the
+//! first run, under the same loads. The distance between the two runs estimates the error of the first:
 //! the second is the less accurate one, so the distance is mostly an error of its own. That holds on bodies, materials
 //! and loads that nobody has tuned anything on, and for every method: exact steps above their critical one,
 //! long and learned ones. A frozen body shows, because the second run's lattice has the true
@@ -58,7 +58,7 @@ const UNCERTAIN: f32 = 2.5;
 const MOST_TIMES: f32 = 4.0;
 
 /// How the second run steps.
-pub(crate) fn second_run() -> Method<'static> {
+pub(crate) fn second_run() -> Method {
     Method::new(Cells::Suggested)
 }
 
@@ -87,7 +87,7 @@ const fn vectors_of_state(element: Element, nodes: usize) -> usize {
 /// A guard without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
 pub struct GuardModel {
-    second: LargeModel<'static>,
+    second: LargeModel,
     watch: Watch,
 }
 
@@ -235,7 +235,7 @@ impl Watch {
 /// A guard with borrowed storage.
 #[derive(Debug)]
 pub struct GuardView<'a> {
-    pub(crate) second: &'a mut LargeModel<'static>,
+    pub(crate) second: &'a mut LargeModel,
     pub(crate) watch: &'a mut Watch,
     pub(crate) storage: &'a mut [NodeVector],
 }

@@ -166,7 +166,7 @@ impl Compliance for StepCompliance<'_, '_> {
     }
 }
 
-impl<T: Threads> InertiaStep<'_, '_, T> {
+impl<T: Threads> InertiaStep<'_, T> {
     /// Finds the pushes of this step, and what they change: forces, next increments and the sums over the nodes.
     #[inline(never)]
     pub(super) fn meet_instruments<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, totals: &mut Totals) {

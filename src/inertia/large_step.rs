@@ -16,7 +16,6 @@ use crate::tled::each_rate;
 
 use super::coarse_motion::CoarseSpace;
 use super::coarse_room::CoarseRoom;
-use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, sort_by_cell};
 use super::layout::Layout;
 use super::matrices::{Bands, Matrices};
@@ -25,11 +24,12 @@ use super::node::{Scaling, half_damping};
 use super::node_tables::NodeTables;
 use super::renewal::{Renewal, RenewalInput};
 use super::rest_check::{FEWEST, MOST_RATIO, RestCheck, longer_step, stiffening};
+use super::rough_motion::RoughMotion;
 use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
 /// A prepared step without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
-pub struct LargeModel<'w> {
+pub struct LargeModel {
     pub(super) nodes: usize,
     pub(super) elements: usize,
     pub(super) element: Element,
@@ -37,7 +37,7 @@ pub struct LargeModel<'w> {
     scene: u32,
     /// The state after the latest step, or at the preparation: inertia belongs to it.
     pub(super) moment: Moment,
-    pub(super) method: Method<'w>,
+    pub(super) method: Method,
     /// Rough motion in the latest damped step.
     pub(super) rough: RoughMotion,
     /// The next step, at most as long as the one that it was prepared for.
@@ -83,12 +83,12 @@ impl<'a> Storage<'a> {
     }
 }
 
-impl<'w> LargeModel<'w> {
+impl LargeModel {
     /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
     /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is overwritten. Up to eight bodies
     /// that share no node have functions of their own, as many in all as there is room for.
     pub fn prepare<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
@@ -104,7 +104,7 @@ impl<'w> LargeModel<'w> {
     /// The same where the model shall stay, for hosts with little stack: a model has 10 kB.
     pub fn prepare_in<'m, M: ElementMaterial>(
         place: &'m mut MaybeUninit<Self>,
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
@@ -168,14 +168,14 @@ impl<'w> LargeModel<'w> {
     #[inline(never)]
     fn new_in<'m, M: ElementMaterial>(
         place: &'m mut MaybeUninit<Self>,
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         step: Step,
     ) -> &'m mut Self {
         place.write(Self::new(method, scene, step))
     }
 
-    fn new<M: ElementMaterial>(method: Method<'w>, scene: SceneView<'_, M>, step: Step) -> Self {
+    fn new<M: ElementMaterial>(method: Method, scene: SceneView<'_, M>, step: Step) -> Self {
         Self {
             nodes: scene.node_count(),
             elements: scene.element_count(),
@@ -330,7 +330,7 @@ impl<'w> LargeModel<'w> {
     }
 
     /// The model with the storage in which it was prepared.
-    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> LargeView<'a, 'w> {
+    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> LargeView<'a> {
         LargeView { model: self, storage }
     }
 }
@@ -347,22 +347,22 @@ fn scaling_of(step: Step, stiffening: f32) -> Scaling {
 
 /// A prepared step with borrowed storage.
 #[derive(Debug)]
-pub struct LargeView<'a, 'w> {
-    pub(super) model: &'a mut LargeModel<'w>,
+pub struct LargeView<'a> {
+    pub(super) model: &'a mut LargeModel,
     pub(super) storage: &'a mut [NodeVector],
 }
 
 /// A prepared step with storage `S` of the caller.
 #[derive(Clone, Debug)]
-pub struct LargeStep<'w, S> {
-    model: LargeModel<'w>,
+pub struct LargeStep<S> {
+    model: LargeModel,
     storage: S,
 }
 
-impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
+impl<S: AsMut<[NodeVector]>> LargeStep<S> {
     /// See [`LargeModel::prepare`].
     pub fn prepare<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
@@ -374,12 +374,12 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     }
 
     /// The model and its storage, to be changed.
-    pub fn parts(&mut self) -> (&mut LargeModel<'w>, &mut [NodeVector]) {
+    pub fn parts(&mut self) -> (&mut LargeModel, &mut [NodeVector]) {
         (&mut self.model, self.storage.as_mut())
     }
 
     /// The model: report and sizes.
-    pub const fn model(&self) -> &LargeModel<'w> {
+    pub const fn model(&self) -> &LargeModel {
         &self.model
     }
 
@@ -435,10 +435,10 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
 }
 
 #[cfg(any(feature = "std", test))]
-impl<'w> LargeStep<'w, std::vec::Vec<NodeVector>> {
+impl LargeStep<std::vec::Vec<NodeVector>> {
     /// The same with storage from the heap.
     pub fn prepare_in_vec<M: ElementMaterial>(
-        method: Method<'w>,
+        method: Method,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
@@ -465,7 +465,7 @@ fn layout_of<'a, M>(
 
 /// The lattice of a method, and that the points are those of the scene.
 fn checked_grid<M: ElementMaterial>(
-    method: &Method<'_>,
+    method: &Method,
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<Grid, InertiaError> {

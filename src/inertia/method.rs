@@ -1,20 +1,20 @@
-//! The lattice and the damper of a long step, and the storage that it needs.
+//! The lattice and the damping of a long step, and the storage that it needs.
 
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 
-use super::damper::Damper;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
 use super::layout::Layout;
+use super::rough_motion::GAIN;
 use super::{InertiaError, coarse_room, matrices, node_tables};
 
-/// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and a small
-/// network damps rough motion, which the lattice cannot represent.
-#[derive(Clone, Debug)]
-pub struct Method<'w> {
-    pub(super) damper: Damper<'w>,
+/// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and rough
+/// motion, which the lattice cannot represent, is damped.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
     pub(super) cells: Cells,
+    pub(super) gain: f32,
 }
 
 /// Cells of a lattice.
@@ -31,19 +31,17 @@ pub enum Cells {
     Given([u32; 3]),
 }
 
-impl Method<'static> {
-    /// With the library's own damper.
+impl Method {
+    /// With this lattice.
     #[must_use]
-    pub fn new(cells: Cells) -> Self {
-        Self::with_damper(Damper::built_in(), cells)
+    pub const fn new(cells: Cells) -> Self {
+        Self { cells, gain: GAIN }
     }
-}
 
-impl<'w> Method<'w> {
-    /// With a damper of a network of your own.
+    /// The same with another gain (1) of the damping of rough motion (`rough_motion.rs`): 0 for none.
     #[must_use]
-    pub const fn with_damper(damper: Damper<'w>, cells: Cells) -> Self {
-        Self { damper, cells }
+    pub const fn with_gain(self, gain: f32) -> Self {
+        Self { gain, ..self }
     }
 
     /// The lattice on a scene with these `points` (m).
@@ -72,7 +70,7 @@ impl Cells {
 
 /// Vectors of storage that a method needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(
-    method: &Method<'_>,
+    method: &Method,
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {

@@ -1,5 +1,5 @@
 //! Steps beyond the critical one. Inertia is raised where a step `D` (s) would be unstable, smooth motion gets its true
-//! inertia back through a coarse lattice, and a small network damps rough motion. A step takes one force evaluation,
+//! inertia back through a coarse lattice, and rough motion is damped. A step takes one force evaluation,
 //! like the exact step. Precedents: selective mass scaling (Olovsson et al. 2005), reciprocal mass matrices (Tkachuk &
 //! Bischoff 2015).
 //!
@@ -38,7 +38,7 @@
 //! on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's, `K <= 4 / D^2
 //! B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a motion it holds
 //! if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.27 that allows `d` =
-//! 0.107; the damper removes at most 0.1. Where more is removed than a damper does, the step moves less by its forces,
+//! 0.107; damping of rough motion removes at most 0.1 (`rough_motion.rs`). Where more is removed, the step moves less by its forces,
 //! `(1 - d / 2) / 0.95`.
 //!
 //! # What is measured or a safeguard
@@ -78,7 +78,6 @@ mod coarse_stiffness;
 #[cfg(test)]
 mod coarse_stiffness_tests;
 mod contact;
-mod damper;
 mod frames;
 mod large_step;
 mod lattice;
@@ -96,12 +95,12 @@ mod renewal;
 mod report;
 mod rest_check;
 mod restriction_pass;
+mod rough_motion;
 mod shorten;
 mod step;
 mod supports;
 mod transport;
 
-pub use damper::{Damper, DamperError};
 pub use large_step::{LargeModel, LargeStep, LargeView};
 pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};

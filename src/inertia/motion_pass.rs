@@ -1,6 +1,6 @@
 //! The pass over the nodes that computes the next increments, vectorised: by the nodes' own inertia, as far as their
-//! share of it allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance and the
-//! damper, and over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that
+//! share of it allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance and of
+//! rough motion, and over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that
 //! the coefficients of a cell stay in registers.
 
 use core::ops::Range;
@@ -9,10 +9,10 @@ use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
 use super::cells::{CellPolynomial, VECTORS_PER_TILE, motion_at};
-use super::damper::RoughMotion;
 use super::lattice::{LatticeNode, rank_of};
 use super::pass_input::{NodeValues, PassInput};
 use super::report::HeldBack;
+use super::rough_motion::RoughMotion;
 use crate::simd::{Contiguous, Kernel, NodeVector, Real, Rows, TILE, dispatch};
 use crate::step::{Moving, Sums, Totals, moved};
 
@@ -99,13 +99,13 @@ pub(super) struct PassTotals {
 pub(super) struct AxisSums<R> {
     sums: [Sums<R>; 3],
     /// In the order of [`RoughMotion::add`].
-    rough: [R; 4],
+    rough: [R; 2],
 }
 
 impl<R: Real> AxisSums<R> {
     #[inline(always)]
     pub(super) fn new(input: &PassInput<'_>) -> Self {
-        Self { sums: [Sums::new(input.step, R::splat); 3], rough: [R::splat(0.0); 4] }
+        Self { sums: [Sums::new(input.step, R::splat); 3], rough: [R::splat(0.0); 2] }
     }
 
     /// Adds nodes with their next increments.
@@ -123,9 +123,9 @@ impl<R: Real> AxisSums<R> {
         let (mut totals, mut rough) = (Totals::NONE, RoughMotion::NONE);
         for row in 0..TILE {
             let (sums, lane) = sums_of_row::<R, _>(sums, row);
-            let ([a, b, c], [d, e, f, g]) = (&sums.sums, &sums.rough);
+            let ([a, b, c], [square, change]) = (&sums.sums, &sums.rough);
             totals.add_axes(&[a.at(lane), b.at(lane), c.at(lane)]);
-            rough.add([d.lane(lane), e.lane(lane), f.lane(lane), g.lane(lane)]);
+            rough.add([square.lane(lane), change.lane(lane)]);
         }
         totals.add_axes(&rest.sums);
         rough.add(rest.rough);
@@ -224,14 +224,12 @@ impl MotionPass<'_> {
         }
         if self.lattice.smooth.is_some() {
             let mut rough = before;
-            let [square, change, both, whole] = &mut sums.rough;
+            let [square, change] = &mut sums.rough;
             for axis in 0..3 {
                 let here = free[axis] * (increment[axis] - smooth[axis]);
                 let difference = here - before[axis];
                 *square = *square + mass * here * here;
                 *change = *change + mass * difference * difference;
-                *both = *both + mass * here * difference;
-                *whole = *whole + mass * free[axis] * increment[axis] * increment[axis];
                 // In a crushed body `here` may be infinite or NaN; with a share of zero it must not be used.
                 if self.lattice.removed > 0.0 {
                     next[axis] = next[axis] - R::splat(self.lattice.removed) * here;

@@ -8,13 +8,13 @@ use core::ops::Range;
 
 use super::added_motion::AddedMotion;
 use super::cells::{CellPolynomial, CellSlots};
-use super::damper::RoughMotion;
 use super::lattice::LatticeNode;
 use super::motion_pass::{LatticeMotion, MotionPass, MotionTables, PassTotals, apply_increments};
 use super::node_tables::NodeTables;
 use super::pass_input::PassInput;
 use super::report::HeldBack;
 use super::restriction_pass::RestrictionPass;
+use super::rough_motion::RoughMotion;
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::simd::NodeVector;
 use crate::step::threads::take;

@@ -5,10 +5,10 @@ use bytemuck::must_cast_slice;
 
 use super::cells::NodesInCells;
 use super::coarse_motion::removed_share;
-use super::damper;
 use super::large_step::LargeModel;
 use super::lattice::LatticeNode;
 use super::node::{Scaling, half_damping};
+use super::rough_motion;
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
@@ -37,10 +37,10 @@ impl ResidualFactors {
     /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a
     /// shorter step, with a smaller `k`, the residual is larger by the ratio of both. Where the balance does not
     /// explain the motion it is smaller ([`super`]).
-    pub(super) fn new(step: &Step, model: &LargeModel<'_>, progress: &Progress) -> Self {
+    pub(super) fn new(step: &Step, model: &LargeModel, progress: &Progress) -> Self {
         let k = half_damping(step);
         let removed = removed_share(progress.energy_balance.allowed_share());
-        let stable = (2.0 - removed.max(damper::MOST)) / (2.0 - damper::MOST);
+        let stable = (2.0 - removed.max(rough_motion::MOST)) / (2.0 - rough_motion::MOST);
         let ratio = stable * (1.0 + model.scaling.k) / (1.0 + k);
         let span = if progress.steps == 0 { 0.5 } else { (0.5 * (1.0 + 1.0 / step.carry())).min(LONGEST_SPAN) };
         let square = step.seconds() * step.seconds() * span;

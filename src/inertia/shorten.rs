@@ -17,7 +17,7 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{Status, Step, StepMethod, Threads, Trial};
 
-impl LargeView<'_, '_> {
+impl LargeView<'_> {
     /// To be called between the last long step and the first shorter one of any method, of `seconds`. Moves no node,
     /// and costs a step. A state whose last step was shorter stays as it is.
     pub fn shorten<M: ElementMaterial>(

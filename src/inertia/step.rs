@@ -16,17 +16,16 @@ use super::cells::{prolong, restrict};
 use super::clusters::ClusterInput;
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
 use super::coarse_room::CoarseRoom;
-use super::damper::RoughMotion;
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, rank_of};
 use super::matrices::{Bands, Matrices};
 use super::motion_pass::{LatticeMotion, PassTotals};
-use super::node::half_damping;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::pulls;
 use super::renewal::RenewalInput;
 use super::report::HeldBack;
+use super::rough_motion::RoughMotion;
 use super::supports::MovingSupports;
 use super::{ADDED_AT_LARGEST_STRAIN, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, LEAST_STRAIN_SHARE};
 
@@ -35,7 +34,7 @@ use super::{ADDED_AT_LARGEST_STRAIN, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, 
 const LARGEST_UNUSED: f32 = 0.05;
 const LEAST_COARSE_SHARE: f32 = 0.8;
 
-impl LargeView<'_, '_> {
+impl LargeView<'_> {
     /// See [`super::LargeStep::step`].
     pub fn step<M: ElementMaterial>(self, scene: SceneView<'_, M>, loads: &Loads<'_>, state: StateView<'_>) -> Status {
         self.step_in_parts(scene, loads, state, &CallingThread)
@@ -62,13 +61,13 @@ impl LargeView<'_, '_> {
     }
 }
 
-impl<'a, 'w> LargeView<'a, 'w> {
+impl<'a> LargeView<'a> {
     /// The model and the parts of its storage, if they are for this scene.
     pub(super) fn opened<M>(
         self,
         scene: SceneView<'_, M>,
         state: &StateView<'_>,
-    ) -> Result<(&'a mut LargeModel<'w>, Storage<'a>), Status> {
+    ) -> Result<(&'a mut LargeModel, Storage<'a>), Status> {
         let Self { model, storage } = self;
         let nodes = model.nodes;
         let mismatch = |room| Status::Mismatch { nodes: scene.node_count(), room };
@@ -80,10 +79,10 @@ impl<'a, 'w> LargeView<'a, 'w> {
 }
 
 /// A step that is being computed, with its results.
-pub(super) struct InertiaStep<'a, 'w, T> {
+pub(super) struct InertiaStep<'a, T> {
     pub(super) threads: &'a T,
     pub(super) step: &'a Step,
-    pub(super) model: &'a mut LargeModel<'w>,
+    pub(super) model: &'a mut LargeModel,
     pub(super) storage: Storage<'a>,
     held_back: HeldBack,
     rough: RoughMotion,
@@ -95,8 +94,8 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     pub(super) response: Option<f32>,
 }
 
-impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
-    pub(super) fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>, threads: &'a T) -> Self {
+impl<'a, T> InertiaStep<'a, T> {
+    pub(super) fn new(step: &'a Step, model: &'a mut LargeModel, storage: Storage<'a>, threads: &'a T) -> Self {
         Self {
             threads,
             step,
@@ -112,7 +111,7 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
     }
 }
 
-impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
+impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
         let TotalForces { forcing, volume, force, after, .. } = trial.forcing(ScalarBound, LOOK_CYCLE_OF_LONG);
@@ -187,7 +186,7 @@ struct MovedLattice {
 }
 
 // Not inlined, like `finish`: the stack of one is free in the others.
-impl<T: Threads> InertiaStep<'_, '_, T> {
+impl<T: Threads> InertiaStep<'_, T> {
     /// Computes all inertia anew if another step has moved the state, or it was reset or restored, or if the length of
     /// steps was changed.
     #[inline(never)]
@@ -255,7 +254,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             coarse.compute(motion, part, scratch.each_mut().map(|vectors| &mut **vectors));
         let removed = removed_share(share.min(coarse.allowed));
         prolong(motion, lattice, matrices.cells);
-        self.damping = step.carry() * method.damper.share(rough, half_damping(step));
+        self.damping = step.carry() * rough.share(method.gain);
         (self.coarse_share, self.response) = (share, Some(share));
         MovedLattice {
             has_smooth: has_part,

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use supple::contact::ContactError;
-use supple::inertia::{DamperError, InertiaError};
+use supple::inertia::InertiaError;
 use supple::io::ReadError;
 use supple::learned::LearnedError;
 use supple::loads::LoadError;
@@ -87,8 +87,6 @@ pub enum LabError {
     File(String),
     /// A network does not fit the learned step.
     LearnedStep(LearnedError),
-    /// A network does not fit long steps.
-    Damper(DamperError),
     /// A file could not be written; the text names it.
     Write(std::io::Error),
 }
@@ -138,7 +136,6 @@ impl fmt::Display for LabError {
             Self::Weights(error) => error.fmt(f),
             Self::File(text) => f.write_str(text),
             Self::LearnedStep(error) => error.fmt(f),
-            Self::Damper(error) => error.fmt(f),
             Self::Write(error) => error.fmt(f),
         }
     }
@@ -156,4 +153,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, ContactError => Contact, StepError => Step, InertiaError => Inertia, WeightError => Weights, SimulationError => Simulation, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, ContactError => Contact, StepError => Step, InertiaError => Inertia, WeightError => Weights, SimulationError => Simulation, LearnedError => LearnedStep, std::io::Error => Write);

@@ -25,7 +25,7 @@
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`large_strain`] | elements at strains beyond a half |
 //! | [`table`] | rows as CSV and as aligned text |
-//! | `training` (feature `train`) | scenes to learn from; the search for a damper |
+//! | `training` (feature `train`) | scenes to learn from |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
 pub mod cost;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use supple::inertia::{self, Cells, Damper, LargeStep};
+use supple::inertia::{self, Cells, LargeStep};
 use supple::learned::{self, LearnedStep};
 use supple::loads::Loads;
 use supple::material::VecMaterial;
@@ -27,10 +27,8 @@ pub enum Method {
     Hold,
     /// The exact step's formula at longer steps, stable or not.
     TledLargeStep,
-    /// Steps beyond the critical one, with the crate's own damper.
+    /// Steps beyond the critical one.
     Long,
-    /// The same with a network of the user's.
-    LongWith(NetworkFile),
     /// Backward Euler, to compare with.
     BackwardEuler,
     /// The implicit midpoint rule, to compare with.
@@ -74,7 +72,7 @@ pub enum Prepared<'a> {
     /// Exact steps of this length.
     Exact(Step),
     /// Steps beyond the critical one, and their damping, 1/s.
-    Long(Box<LargeStep<'static, Vec<NodeVector>>>, f32),
+    Long(Box<LargeStep<Vec<NodeVector>>>, f32),
     /// A network's steps, and the exact ones of its lead-in.
     Learned(Box<LearnedStep<'static, Vec<NodeVector>>>, Step, Lead),
     /// Neither of these.
@@ -155,7 +153,7 @@ impl Method {
             Self::Learned(Family::CompactInt8) => "compact-int8",
             Self::Learned(Family::OtherStep) => "compact-other-step",
             Self::Switching => "long-switching",
-            Self::LongWith(file) | Self::LearnedWith(file) => file.name,
+            Self::LearnedWith(file) => file.name,
         }
     }
 
@@ -168,14 +166,12 @@ impl Method {
         })
     }
 
-    /// With the network of a weight file: long steps, or the learned step.
+    /// The learned step with the network of a weight file.
     pub fn with(path: &Path) -> Result<Self, LabError> {
         let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
         let bytes = supple::io::read_file(path).map_err(|error| problem(&error))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let file = NetworkFile::leaked(String::leak(name), &bytes).map_err(|error| problem(&error))?;
-        let damps = Damper::new(Network::parse(file.bytes)?).is_ok();
-        Ok(if damps { Self::LongWith(file) } else { Self::LearnedWith(file) })
+        NetworkFile::leaked(String::leak(name), &bytes).map(Self::LearnedWith).map_err(|error| problem(&error))
     }
 
     /// At which multiples of a scene's step it is run if asked for `multiples`. At 1 the long step is the exact one,
@@ -207,7 +203,7 @@ impl Method {
     #[must_use]
     pub const fn meets_instruments(self) -> bool {
         use Method as M;
-        matches!(self, M::Tled | M::TledLargeStep | M::Long | M::LongWith(_) | M::Switching)
+        matches!(self, M::Tled | M::TledLargeStep | M::Long | M::Switching)
     }
 
     /// Time at the start that exact steps take, s.
@@ -251,10 +247,6 @@ impl Method {
             Self::Tled => exact(spec.timing.refinement),
             Self::TledLargeStep => exact(1),
             Self::Long | Self::Switching => long(inertia::Method::new(Cells::Suggested), state),
-            Self::LongWith(file) => {
-                let damper = Damper::new(Network::parse(file.bytes)?)?;
-                long(inertia::Method::with_damper(damper, Cells::Suggested), state)
-            }
             Self::BackwardEuler => Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping)),
             Self::ImplicitMidpoint => Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping)),
             Self::Learned(family) => {

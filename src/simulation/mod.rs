@@ -49,9 +49,9 @@ pub enum Method<'w> {
     #[default]
     Exact,
     /// Steps beyond the critical one ([`crate::inertia`]), of [`Settings::step`] at most.
-    Long(inertia::Method<'w>),
+    Long(inertia::Method),
     /// Steps that choose their length ([`crate::adaptive`]) for [`Settings::tolerance`].
-    Auto(inertia::Method<'w>),
+    Auto(inertia::Method),
     /// Learned steps ([`crate::learned`]).
     Learned {
         /// The network.

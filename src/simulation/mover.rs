@@ -24,9 +24,9 @@ pub enum Mover<'a, 'w> {
     /// Exact steps.
     Exact(ExactSteps<'a>),
     /// Steps beyond the critical one, with the storage in which they were prepared, and what estimates their error.
-    Long(&'a mut LargeModel<'w>, &'a mut [NodeVector], Option<GuardView<'a>>),
+    Long(&'a mut LargeModel, &'a mut [NodeVector], Option<GuardView<'a>>),
     /// Steps that choose their length.
-    Auto(AdaptiveView<'a, 'w>),
+    Auto(AdaptiveView<'a>),
     /// Learned steps, the exact ones that lead them, and what estimates their error.
     Learned(LearnedView<'a, 'w>, ExactSteps<'a>, &'a mut Lead, Option<GuardView<'a>>),
 }
@@ -243,7 +243,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
 
     fn long_steps<M: ElementMaterial>(
         &mut self,
-        model: &mut LargeModel<'_>,
+        model: &mut LargeModel,
         storage: &mut [NodeVector],
         mut guard: Option<GuardView<'_>>,
         span: f64,
@@ -291,7 +291,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
 
     fn auto_steps<M: ElementMaterial>(
         &mut self,
-        adaptive: AdaptiveView<'_, '_>,
+        adaptive: AdaptiveView<'_>,
         span: f64,
         scene: SceneView<'_, M>,
         state: &mut StateView<'_>,

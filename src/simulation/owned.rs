@@ -64,8 +64,8 @@ type Touchable = (Vec<SurfaceNode>, Vec<[u32; 3]>);
 #[derive(Debug)]
 pub(super) enum Prepared<'w> {
     Exact(Exact),
-    Long(Box<LargeStep<'w, Vec<NodeVector>>>, Option<Box<Guard<Vec<NodeVector>>>>),
-    Auto(Box<Adaptive<'w, Vec<NodeVector>>>),
+    Long(Box<LargeStep<Vec<NodeVector>>>, Option<Box<Guard<Vec<NodeVector>>>>),
+    Auto(Box<Adaptive<Vec<NodeVector>>>),
     Learned(Box<LearnedStep<'w, Vec<NodeVector>>>, Exact, Lead, Option<Box<Guard<Vec<NodeVector>>>>),
 }
 
@@ -392,7 +392,7 @@ impl<'w> Simulation<'w> {
 
     /// The prepared steps of [`Method::Long`], for their lattice and reports.
     #[must_use]
-    pub fn long_step(&self) -> Option<&LargeStep<'w, Vec<NodeVector>>> {
+    pub fn long_step(&self) -> Option<&LargeStep<Vec<NodeVector>>> {
         match &self.prepared {
             Some(Prepared::Long(large, _)) => Some(large),
             _ => None,
@@ -401,7 +401,7 @@ impl<'w> Simulation<'w> {
 
     /// Those of [`Method::Auto`].
     #[must_use]
-    pub fn auto_step(&self) -> Option<&Adaptive<'w, Vec<NodeVector>>> {
+    pub fn auto_step(&self) -> Option<&Adaptive<Vec<NodeVector>>> {
         match &self.prepared {
             Some(Prepared::Auto(adaptive)) => Some(adaptive),
             _ => None,

@@ -6,7 +6,6 @@ enum { ROOM = 4 << 20 };
 SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(weights, 40000);
-SUPPLE_MEMORY(damper, 4000);
 /* Twice each: the original and its copy. */
 SUPPLE_MEMORY(state_memory, 2 * SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(learned_memory, 2 * SUPPLE_LEARNED_SIZE(NODES, 1));
@@ -124,7 +123,7 @@ static void learned_copied(void) {
 
 static void large_copied(void) {
     size_t needed = 0;
-    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 2e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 2e-3f, 20.0f, {0, 0, 0}};
     supple_state *state = fresh();
     supple_large *large;
     supple_report report;
@@ -160,7 +159,7 @@ static void large_copied(void) {
 
 /* Back to a copy, or to what was saved, and on in steps that are shorter than those that the guard has seen. */
 static void guard_restored(void) {
-    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 2e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 2e-3f, 20.0f, {0, 0, 0}};
     const supple_guard_config guarded = {SUPPLE_CONFIG(supple_guard_config), config.seconds, config.damping, 5, 0.0f};
     for (int copied = 0; copied < 2; copied++) {
         supple_state *state = fresh();
@@ -191,25 +190,6 @@ static void guard_restored(void) {
     printf("copies: a guard begins anew after a copy and a restore, whatever steps follow\n");
 }
 
-/* Without a file long steps give the bits of those with the file of the library's own damper. */
-static void damper_built_in(void) {
-    size_t bytes;
-    const void *read = file("weights/damper.weights", damper, sizeof damper, &bytes);
-    uint64_t ends[2];
-    for (int given = 0; given < 2; given++) {
-        const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 2e-3f, 20.0f, {0, 0, 0},
-                                            given ? read : NULL, given ? bytes : 0};
-        supple_state *state = fresh();
-        supple_large *large;
-        move_end(scene, loads, 0.01f, -0.005f, 0.01f);
-        CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
-        CHECK(supple_large_step(scene, loads, state, large, 100, NULL, NULL) >= 0);
-        ends[given] = where(state);
-    }
-    CHECK(ends[0] == ends[1]);
-    printf("copies: long: the same bits with the damper that is built in and with its file\n");
-}
-
 int main(void) {
     const supple_scene_config config = bar_config();
     CHECK(supple_scene_init(scene_memory, sizeof scene_memory, &config, &scene, NULL) == SUPPLE_OK);
@@ -219,6 +199,5 @@ int main(void) {
     learned_copied();
     large_copied();
     guard_restored();
-    damper_built_in();
     return 0;
 }

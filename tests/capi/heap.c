@@ -42,7 +42,7 @@ int main(void) {
 
     const supple_scene_config config = bar_config();
     const supple_learned_config network = {SUPPLE_CONFIG(supple_learned_config), 1, 0, weights, of_weights};
-    const supple_large_config beyond = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config beyond = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}};
     const supple_force force = {NODES / 2, {0.01f, 0.0f, 0.0f}, 0.0f};
     const float gravity[3] = {0.0f, 0.0f, -9.81f};
     supple_scene *scene;

@@ -81,10 +81,10 @@ static struct {
     uint64_t before;
     int written;
 } slots[SLOTS];
-static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, of_rest, of_removed,
+static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_out, of_faces, of_saved, of_rest, of_removed,
     of_places, of_found, of_field, of_scratch, of_prony, of_fibres, of_directions,
     copies[2];
-static size_t weights_bytes, damper_bytes;
+static size_t weights_bytes;
 static uint32_t of_bar[4 * TETS][3], bar_triangles;
 static const char *doing;
 static supple_report report;
@@ -336,9 +336,6 @@ static supple_status make_large(void) {
         for (int axis = 0; axis < 3; axis++) {
             config.cells[axis] = number(1 + below(3));
         }
-    }
-    if (one_in(3)) {
-        config.weights = one_in(40) ? NULL : end_of(&of_damper, (damper_bytes + 63) / 64 * 64), config.weights_bytes = damper_bytes;
     }
     const float *p = points_for(nodes_of(scene));
     size_t needed = 64, bytes;
@@ -1205,7 +1202,7 @@ int main(int argc, char **argv) {
     }
     of_removed = arena_of(TETS), of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
-    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 16);
+    of_weights = arena_of(1 << 16), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 16);
     of_prony = arena_of(2 * sizeof(supple_prony)), of_fibres = arena_of(2 * sizeof(supple_fibres)), of_directions = arena_of(24 * TETS);
     of_rest = arena_of(supple_settle_size(NODES) + 64);
     of_places = arena_of(PLACES * sizeof(supple_followed_point)), of_found = arena_of(16 * TETS);
@@ -1214,8 +1211,6 @@ int main(int argc, char **argv) {
     copies[0] = arena_of(sizes_of[STATE]), copies[1] = arena_of(sizes_of[LARGE]);
     file("weights/compact-10.weights", of_weights.start, of_weights.room, &weights_bytes);
     memmove(end_of(&of_weights, (weights_bytes + 63) / 64 * 64), of_weights.start, weights_bytes);
-    file("weights/damper.weights", of_damper.start, of_damper.room, &damper_bytes);
-    memmove(end_of(&of_damper, (damper_bytes + 63) / 64 * 64), of_damper.start, damper_bytes);
     const time_t start = time(NULL);
     while (is_time ? time(NULL) - start < (time_t)most : calls < most) {
         if (calls % 300 == 0) {

@@ -63,13 +63,6 @@ programs() {
         exit 1
     fi
     gcc -std=c11 "${warnings[@]}" examples/bar.c "$static" -o "$folder/bar"
-    # The text of its recipe is in the damper that the library has built in; a program that takes exact steps itself has neither.
-    gcc -std=c11 "${warnings[@]}" -pthread -Wl,--gc-sections tests/capi/threads.c "$static" -o "$folder/threads-alone"
-    grep -q "damps rough motion" "$static" || { echo "the library has no damper" >&2; exit 1; }
-    if grep "damps rough motion" "$folder/threads-alone"; then
-        echo "exact steps link the damper" >&2
-        exit 1
-    fi
     cat >"$folder/bar.toml" <<'SCENE'
 damping = 20.0
 [mesh]

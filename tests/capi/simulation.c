@@ -99,7 +99,7 @@ static void is_what_a_host_would_do(uint32_t steps, const char *name) {
     CHECK(supple_state_init(state_memory, sizeof state_memory, scene, &state) == SUPPLE_OK);
     CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
     supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), EXACT, DAMPING};
-    const supple_large_config large = {SUPPLE_CONFIG(supple_large_config), longest, DAMPING, {0, 0, 0}, NULL, 0};
+    const supple_large_config large = {SUPPLE_CONFIG(supple_large_config), longest, DAMPING, {0, 0, 0}};
     supple_guard_config guarded = {SUPPLE_CONFIG(supple_guard_config), LONG, DAMPING, 3, 0.0f};
     if (steps == SUPPLE_STEPS_LONG)
         CHECK(supple_large_init(steps_memory, ROOM, scene, state, points[0], &large, (supple_large **)&stepper, NULL) == SUPPLE_OK);

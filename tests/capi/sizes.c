@@ -5,7 +5,7 @@
 SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 
 static supple_large_config large_of(uint32_t x, uint32_t y, uint32_t z) {
-    return (supple_large_config){SUPPLE_CONFIG(supple_large_config), 1e-3f, 10.0f, {x, y, z}, NULL, 0};
+    return (supple_large_config){SUPPLE_CONFIG(supple_large_config), 1e-3f, 10.0f, {x, y, z}};
 }
 
 int main(void) {

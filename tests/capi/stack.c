@@ -130,7 +130,7 @@ int main(void) {
     file("weights/compact-10.weights", weights, sizeof weights, &of_weights);
     scene_config = bar_config();
     network = (supple_learned_config){SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, of_weights};
-    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}};
     guarded = (supple_guard_config){SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 4, 0.0f};
     step = (supple_step_config){SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
     static const struct {

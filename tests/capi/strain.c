@@ -79,7 +79,7 @@ int main(void) {
     CHECK(supple_scene_init(other_memory, sizeof other_memory, &config, &other, &error) == SUPPLE_OK);
     CHECK(moved(other) != end);
 
-    const supple_large_config large_config = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 10.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config large_config = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 10.0f, {0, 0, 0}};
     supple_large *large = NULL;
     supple_state *state = fresh(other);
     CHECK(supple_large_init(large_memory, sizeof large_memory, other, state, points[0], &large_config, &large, &error) == SUPPLE_OK);

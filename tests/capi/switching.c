@@ -27,7 +27,7 @@ static supple_state *fresh(void *memory) {
 }
 
 static supple_large *prepared(supple_state *state) {
-    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}};
     supple_large *large;
     CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
     return large;

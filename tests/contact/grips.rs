@@ -25,7 +25,7 @@ fn grips(body: &Body, displacements: &[NodeVector], forceps: Instrument<'_>, tim
     forceps.grips(0, surface, displacements, time, 0.0005).collect()
 }
 
-type Large = LargeStep<'static, Vec<NodeVector>>;
+type Large = LargeStep<Vec<NodeVector>>;
 
 /// A step under gravity with these grips.
 fn step(

@@ -15,7 +15,7 @@ use crate::networks::uniform;
 /// Who takes the steps.
 enum Taker {
     Exact(Step),
-    Long(Box<LargeStep<'static, Vec<NodeVector>>>),
+    Long(Box<LargeStep<Vec<NodeVector>>>),
 }
 
 /// A body, its steps, and what the instruments do in them.
@@ -27,7 +27,7 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    pub(crate) fn new(mut body: Body, method: Option<Method<'static>>, seconds: f32, damping: f32) -> Self {
+    pub(crate) fn new(mut body: Body, method: Option<Method>, seconds: f32, damping: f32) -> Self {
         let step = Step::unchecked(seconds, damping).unwrap();
         let (scene, points) = (body.scene.clone(), body.points.clone());
         let taker = match method {
@@ -57,7 +57,7 @@ impl Run {
 
 pub(crate) const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [4, 4, 8] };
 
-pub(crate) fn long() -> Method<'static> {
+pub(crate) fn long() -> Method {
     Method::new(Cells::Given([1, 1, 2]))
 }
 
@@ -109,7 +109,7 @@ fn path(speed: f64) -> [(f64, [f32; 3]); 5] {
 }
 
 /// Means of the force over the parts of the path, N, the deepest node, m, and the nodes that still touch at the end.
-fn course(method: Option<Method<'static>>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f32, u32) {
+fn course(method: Option<Method>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f32, u32) {
     const DAMPING: f32 = 20.0;
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
     let mut run = Run::new(Body::new(BAR, &fixed, DAMPING), method, seconds, DAMPING);
@@ -151,7 +151,7 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
     let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
     // Beyond 20 mm/s steps so long do not resolve how the bar swings.
-    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.66, 0.02)] {
+    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.7, 0.02)] {
         let (exact, _, left) = course(None, 0.25 * critical, speed);
         println!("{:.0} mm/s, exact: {exact:.4?}", 1e3 * speed);
         assert!(exact[1][0] < -1e-3 && left == 0);

@@ -57,7 +57,7 @@ fn path(speed: f64) -> [(f64, [f32; 3]); 5] {
 }
 
 /// Means of the force over the parts of the path, N, and the deepest point, m.
-fn course(method: Option<Method<'static>>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f64) {
+fn course(method: Option<Method>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f64) {
     let is_long = method.is_some();
     let mut run = Run::new(Body::new(BAR, &held(), DAMPING).with_triangles(), method, seconds, DAMPING);
     let path = path(speed);

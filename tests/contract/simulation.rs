@@ -20,7 +20,7 @@ use crate::support::{Body, EXP, bits};
 
 const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
-fn long() -> inertia::Method<'static> {
+fn long() -> inertia::Method {
     inertia::Method::new(Cells::Suggested)
 }
 

@@ -1,7 +1,6 @@
 //! Damaged recipes for training: a recipe is refused with a reason, or its numbers are in their ranges.
 
 use supple::train::recipe::{MotionRecipe, Recipe};
-use supple_lab::training::damper;
 
 use crate::hostile::{Changes, Run, measured};
 
@@ -13,7 +12,7 @@ const ANY: u64 = 20_000;
 fn recipes() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../weights");
     let read = |name| std::fs::read(folder.join(name)).unwrap();
-    let sound = ["compact-10.toml", "paper-10.toml", "damper.toml"].map(read);
+    let sound = ["compact-10.toml", "paper-10.toml"].map(read);
     let words: &[&[u8]] = &[
         b"[noise]\n",
         b"copies = 1\n",
@@ -29,15 +28,15 @@ fn recipes() {
     Run::new("recipes", 4_000).each(|dice| {
         let bytes = changes.input(dice);
         let text = String::from_utf8_lossy(&bytes);
-        let ((recipe, damper), memory) = measured(|| (Recipe::parse(&text), damper::Recipe::parse(&text)));
+        let (recipe, memory) = measured(|| Recipe::parse(&text));
         assert!(memory <= BYTES * bytes.len() as u64 + ANY, "{memory} bytes for {}", bytes.len());
-        for error in [recipe.as_ref().err(), damper.as_ref().err()].into_iter().flatten() {
+        if let Err(error) = &recipe {
             assert!(error.to_string().len() > 4, "{error:?}");
         }
         if let Ok(recipe) = &recipe {
             let usable = |motion: &MotionRecipe| motion.frames > 0 && motion.to.is_finite();
             assert!(!recipe.motion.is_empty() && recipe.motion.iter().all(usable) && recipe.training.rate.is_finite());
         }
-        recipe.is_ok() || damper.is_ok()
+        recipe.is_ok()
     });
 }

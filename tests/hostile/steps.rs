@@ -12,7 +12,6 @@ use supple::step::{Status, Step};
 use supple::tled;
 
 use crate::hostile::{Dice, Run};
-use crate::networks;
 use crate::support::bodies::{held, small_bar};
 use crate::support::{Body, EXP, NEO, bits, rest_of, tissue};
 
@@ -27,7 +26,7 @@ struct Pair<'a, M> {
 #[derive(Clone)]
 struct Moved {
     state: VecState,
-    large: Option<LargeStep<'static, Vec<NodeVector>>>,
+    large: Option<LargeStep<Vec<NodeVector>>>,
 }
 
 impl Moved {
@@ -85,7 +84,7 @@ fn sequence<M: ElementMaterial>(dice: &mut Dice, body: &Body, material: M, is_lo
     let critical = tled::critical_step(&scene, &mut state).unwrap();
     let times = if is_long { [2.0, 10.0, 40.0][dice.below(3)] } else { 0.9 };
     let step = Step::unchecked(times * critical.seconds, [0.0, 20.0][dice.below(2)]).unwrap();
-    let method = is_long.then(|| Method::with_damper(networks::damper(20.0), Cells::Suggested));
+    let method = is_long.then(|| Method::new(Cells::Suggested).with_gain(20.0));
     let large =
         method.map(|method| LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap());
     let mut guard = Guard::prepare_in_vec(scene.view(), &body.points, state.view(), step, 3).unwrap();

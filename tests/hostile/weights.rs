@@ -1,7 +1,6 @@
 //! Damaged weight files, in float32 and int8, and damaged exports of PyTorch. Reading a weight file takes no memory. A
 //! network that is accepted gives finite numbers in its ranges, and steps that it moves are finite or refused.
 
-use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
 use supple::mlp::{Network, from_safetensors};
@@ -95,16 +94,6 @@ fn weight_files() {
                     Ok(status) => assert!(matches!(status, Status::Diverged(_))),
                     Err(error) => assert!(!error.to_string().is_empty()),
                 }
-            }
-        } else if let Ok(damper) =
-            Network::parse(memory.bytes()).map_err(drop).and_then(|n| Damper::new(n).map_err(drop))
-        {
-            let step = Step::unchecked(20.0 * critical.seconds, 20.0).unwrap();
-            let method = Method::with_damper(damper, Cells::Given([1, 1, 2]));
-            let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
-            for _ in 0..5 {
-                let status = large.step(scene.view(), &loads, state.view());
-                assert!(!status.is_taken() || finite(&state), "{status:?}");
             }
         }
         true

@@ -2,7 +2,6 @@
 
 mod command;
 #[cfg(feature = "slow-tests")]
-mod damper;
 mod evaluate;
 mod hard;
 mod large_strain;

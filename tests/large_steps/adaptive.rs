@@ -16,7 +16,7 @@ use crate::support::bodies::{held, torsion};
 use crate::support::{Body, EXP, bound, mean_distance, rest_of, tissue, to_f64};
 
 type Scene = VecScene<VecMaterial>;
-type VecAdaptive = Adaptive<'static, Vec<NodeVector>>;
+type VecAdaptive = Adaptive<Vec<NodeVector>>;
 
 const DAMPING: f32 = 20.0;
 /// s.

@@ -4,12 +4,12 @@
 
 mod adaptive;
 mod bodies;
-mod damper;
 mod guard;
 mod pulled;
 mod reaction;
 mod refused;
 mod restored;
+mod rough_motion;
 mod rounding;
 mod switching;
 mod turning;
@@ -25,7 +25,7 @@ use crate::support::{
     Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64,
 };
 use crate::support::{reference_law, regions};
-use crate::{networks, reference, support};
+use crate::{reference, support};
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
@@ -35,9 +35,9 @@ use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{EnergyBalance, Status, Step};
 use supple::tled;
 
-type VecLargeStep = LargeStep<'static, Vec<NodeVector>>;
+type VecLargeStep = LargeStep<Vec<NodeVector>>;
 
-/// Ten times the gain of the shipped damper.
+/// Five times the gain of a method.
 const GAIN: f32 = 20.0;
 
 /// Prepared for this step from the state as it is; rough motion is damped with this gain.
@@ -48,7 +48,7 @@ fn prepared<M: ElementMaterial>(
     step: Step,
     gain: f32,
 ) -> VecLargeStep {
-    let method = Method::with_damper(networks::damper(gain), Cells::Suggested);
+    let method = Method::new(Cells::Suggested).with_gain(gain);
     let grid = method.grid(scene.view(), &body.points).unwrap();
     assert!(grid.functions > 0, "no lattice for this scene");
     let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();

@@ -11,13 +11,13 @@ use crate::large_steps::{limit, prepared};
 use crate::support::bodies::{held, small_bar};
 use crate::support::{Body, NEO, bits, displaced, rest_of, tissue};
 
-fn given(cells: [u32; 3]) -> Method<'static> {
+fn given(cells: [u32; 3]) -> Method {
     Method::new(Cells::Given(cells))
 }
 
 /// What [`LargeStep::prepare`] says of a small bar and storage of so many vectors. It gives no step then.
 fn refused(
-    method: Method<'static>,
+    method: Method,
     vectors: usize,
     spoil: impl Fn(&VecScene<VecMaterial>, &mut Vec<[f32; 3]>, &mut VecState),
 ) -> InertiaError {

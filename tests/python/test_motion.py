@@ -92,17 +92,13 @@ def test_long_steps_follow_exact_ones(lobe, liver, method, options, most):
     assert report.estimate is not None and report.estimate > 0.3 * error - 1e-6
 
 
-def test_the_damper_of_a_file_takes_the_place_of_the_own_one(lobe, liver):
-    """The same bits where the file is that of the library's own damper."""
+def test_weights_are_those_of_learned_steps(lobe, liver):
+    """Other steps, and a network of another shape, are refused in words."""
     scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
-    ends = []
-    for weights in (None, ROOT / "weights" / "damper.weights"):
-        simulation = supple.Simulation(scene, "long", step=2e-3, damping=20.0, gravity=GRAVITY, weights=weights)
-        simulation.advance(0.1)
-        ends.append(simulation.displacements.copy())
-    assert np.array_equal(*ends)
-    with pytest.raises(supple.InputError, match="long: "):
+    with pytest.raises(supple.InputError, match="weights are those of learned steps; long steps have none"):
         supple.Simulation(scene, "long", step=2e-3, weights=ROOT / "weights" / "compact-10.weights")
+    with pytest.raises(supple.InputError, match="learned: .*other-shape"):
+        supple.Simulation(scene, "learned", weights=ROOT / "tests" / "data" / "other-shape.weights")
 
 
 def test_a_ball_presses_and_leaves(lobe, liver):

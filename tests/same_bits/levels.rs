@@ -32,7 +32,7 @@ fn scene(material: VecMaterial, points: &[[f32; 3]]) -> VecScene<VecMaterial> {
 }
 
 /// The displacements after exact steps of 50 us, or after steps of a method that are 20 times as long.
-fn run(material: &VecMaterial, level: Level, method: Option<Method<'_>>) -> Bits {
+fn run(material: &VecMaterial, level: Level, method: Option<Method>) -> Bits {
     assert!(Level::force(level), "this processor lacks {level:?}");
     let points: Vec<_> = BAR.points().collect();
     let scene = scene(material.clone(), &points);

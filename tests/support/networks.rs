@@ -4,9 +4,8 @@
 
 use std::cell::Cell;
 
-use supple::inertia::Damper;
 use supple::material::{Element, Exponential};
-use supple::mlp::{Activation, Description, ForceInput, Int8Description, LayerDescription, Network, Range};
+use supple::mlp::{Activation, Description, ForceInput, Int8Description, LayerDescription, Range};
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
@@ -122,12 +121,6 @@ pub fn predicted(network: &Description<'_>, inputs: &[f32]) -> Vec<f64> {
             value.clamp(f64::from(range.least), f64::from(range.most))
         })
         .collect()
-}
-
-/// A damper of constant gain; its memory is never given back.
-pub fn damper(gain: f32) -> Damper<'static> {
-    let weights = Box::leak(Box::new(constant(4, gain)));
-    Damper::new(Network::parse(weights.bytes()).unwrap()).unwrap()
 }
 
 /// A network whose one output is always `value`.

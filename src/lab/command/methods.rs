@@ -33,7 +33,7 @@ pub(crate) struct Asked {
     /// Tetrahedra of the scenes, linear or nodal-pressure; linear unless given, as in the paper
     #[arg(long, value_name = "NAME", value_parser = element_named)]
     element: Option<Element>,
-    /// Weight file of a network to judge as well, a learned step's at its own step, a damper's at all; may be repeated
+    /// Weight file of a network of the learned step to judge as well, at its own step; may be repeated
     #[arg(long, value_name = "FILE")]
     weights: Vec<PathBuf>,
     /// Scene whose error the report draws over the step; reversed unless given, if that is among the scenes

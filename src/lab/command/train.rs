@@ -11,7 +11,6 @@ use supple::train::recipe::Recipe;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output};
 use supple_cli::weight_file;
-use supple_lab::training::damper;
 
 use super::exemplar::learned_from;
 use super::quantise::quantise_trained;
@@ -36,9 +35,6 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let Asked { recipe, out } = asked;
     let problem = |error: &dyn std::fmt::Display| Problem::in_file(recipe, error);
     let text = supple::io::read_text(recipe).map_err(|error| problem(&error))?;
-    if is_damper(&text) {
-        return train_damper(&text, recipe, out);
-    }
     let parsed = Recipe::parse(&text).map_err(|error| problem(&error))?;
     let folder = checkpoints(out);
     message!("simulating the motion to learn from ...");
@@ -70,34 +66,6 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     quantise_trained(out, &bytes, &parsed, &collected)?;
     // Only now that both weight files are safe.
     let _ = std::fs::remove_dir_all(&folder);
-    Ok(End::Reached)
-}
-
-fn is_damper(recipe: &str) -> bool {
-    recipe.parse::<toml::Table>().is_ok_and(|table| table.contains_key("damper"))
-}
-
-/// A few minutes of roll-outs: there are no checkpoints.
-fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
-    message!("simulating the motions to be judged by ...");
-    let trained = damper::train(text, |at| {
-        message!(
-            "generation {} of {}, best {:.4}, {} left",
-            at.generation,
-            at.generations,
-            at.best,
-            clock(at.remaining)
-        );
-        ControlFlow::Continue(())
-    });
-    let trained = trained.map_err(|error| Problem::in_file(recipe, error))?;
-    weight_file::write(out, &trained.bytes)?;
-    output!("mean error over nodes and time, mm");
-    output!("scene            load  step  undamped      rule   network");
-    for damper::Judged { scene, load, multiple, errors: [undamped, rule, network] } in &trained.judged {
-        output!("{scene:14} {load:6} {multiple:4}x {undamped:9.4} {rule:9.4} {network:9.4}");
-    }
-    output!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
     Ok(End::Reached)
 }
 

@@ -1,7 +1,5 @@
-//! Training on the laboratory's scenes (feature `train`): those that a network of the learned step learns from
-//! ([`supple::train`]), and in [`damper`] the search for the network that damps rough motion, by roll-outs.
-
-pub mod damper;
+//! The laboratory's scenes for training (feature `train`), which networks of the learned step learn from
+//! ([`supple::train`]).
 
 use supple::loads::{LoadsOverTime, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};

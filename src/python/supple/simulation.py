@@ -152,7 +152,7 @@ class Simulation:
     damping : 1/s; learned steps take that of their training
     tolerance : mean error (m) that automatic steps keep, half a millimetre or less in bodies below 10 cm unless given, and that the
         guard allows, a fifth of the motion unless given
-    weights : file of the network, for learned steps; of another damper than the library's own, for long and automatic ones
+    weights : file of the network, for learned steps
     lead_in : seconds of exact steps before a network takes over
     guard : whether a second run estimates the error of long and learned steps
     fallback : whether exact steps take the place of learned ones that are not to be believed; else `advance` raises there
@@ -202,7 +202,9 @@ class Simulation:
                 if not (np.isfinite(value) and value > 0.0):
                     raise InputError(f"{'step' if name == 'seconds' else name} {value}: it must be a positive number")
                 setattr(settings, name, value)
-        if weights is not None and method != "exact":
+        if weights is not None:
+            if method != "learned":
+                raise InputError(f"weights are those of learned steps; {method} steps have none")
             self._weights = _weights(weights)
             settings.weights, settings.weights_bytes = self._weights.pointer, self._weights.size
         self._adopt(*made_of(scene, settings, method if weights is None else f"{method}: {weights}"))

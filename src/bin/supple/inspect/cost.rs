@@ -134,7 +134,7 @@ fn describe_exact(
 }
 
 /// The method that long steps of the scene have, or would have. None if the mesh is too small for them.
-fn long_method(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Option<Method<'static>>, Problem> {
+fn long_method(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Option<Method>, Problem> {
     if let Some(method) = &setup.time.method {
         grid(setup, scene, method)?;
         return Ok(Some(method.clone()));
@@ -146,7 +146,7 @@ fn long_method(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Optio
 
 /// Prints what steps beyond the critical one need and do at rest.
 fn describe_beyond(
-    method: &Method<'static>,
+    method: &Method,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,

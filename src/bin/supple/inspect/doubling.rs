@@ -48,7 +48,7 @@ enum Comparison {
 
 /// Prints the table of errors, and the longest step that keeps `accuracy` (mm).
 pub(crate) fn recommend(
-    method: &Method<'static>,
+    method: &Method,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
@@ -99,7 +99,7 @@ pub(crate) fn recommend(
 /// Prints the errors that long steps will have at the worst moment of the whole scene. Step doubling at two lengths
 /// gives the order of convergence `p`: `|u_2D - u_D| = (2^p - 1) E(D)`, and `E` goes with `D^p`.
 pub(crate) fn predict_errors(
-    method: &Method<'static>,
+    method: &Method,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
@@ -132,7 +132,7 @@ fn compare(
     loads: &Loads<'_>,
     seconds: f32,
     span: f64,
-    method: &Method<'static>,
+    method: &Method,
 ) -> Result<Comparison, Problem> {
     let steps = (span / f64::from(seconds)) as u64;
     if steps == 0 {

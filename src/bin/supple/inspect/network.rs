@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use supple::inertia::Damper;
 use supple::learned::{FEATURES, LearnedModel, PREDICTED};
 use supple::mlp::{Activation, ForceInput, Int8, Layer, Parameters, Range, hexadecimal};
 
@@ -37,35 +36,24 @@ const OUTPUTS: [Quantity; PREDICTED] = [
     ("acceleration, binormal", "m/s^2", 1.0),
 ];
 
-/// The same of a damper (`src/inertia/damper.rs`), without units.
-const DAMPER_INPUTS: [Quantity; 4] = [
-    ("change over rough, ln", "", 1.0),
-    ("rough over all, ln", "", 1.0),
-    ("cosine of the change", "", 1.0),
-    ("damping in a step, ln", "", 1.0),
-];
-const DAMPER_OUTPUTS: [Quantity; 1] = [("gain", "", 1.0)];
-
 /// Prints what a weight file holds.
 pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     let memory = weight_file::read(path)?;
     let network = weight_file::parse(path, &memory)?;
     let (inputs, outputs) = (network.inputs(), network.outputs());
     let recipe = network.recipe();
-    let damps = Damper::new(network).is_ok();
     row("weights", path.display());
     row("size", format!("{} bytes", memory.bytes().len()));
     row(
         "network",
         format!(
-            "{} inputs, {} outputs, {} multiply-adds per {}",
+            "{} inputs, {} outputs, {} multiply-adds per vertex",
             inputs.len(),
             outputs.len(),
-            network.multiply_adds(),
-            if damps { "step, a damper of rough motion for any step" } else { "vertex" }
+            network.multiply_adds()
         ),
     );
-    row(if damps { "longest step" } else { "step" }, describe_step(&network));
+    row("step", describe_step(&network));
     row("learned from", describe_tissue(&network));
     row("damping", format!("{} 1/s", recipe.damping));
 
@@ -86,13 +74,12 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
         }
     }
     let learned_step = inputs.len() == FEATURES && outputs.len() == PREDICTED;
-    let (input_names, output_names): (&[Quantity], &[Quantity]) = match (learned_step, damps) {
-        (true, _) if recipe.force == ForceInput::PerMass => (&INPUTS_PER_MASS, &OUTPUTS),
-        (true, _) => (&INPUTS, &OUTPUTS),
-        (_, true) => (&DAMPER_INPUTS, &DAMPER_OUTPUTS),
-        _ => (&[], &[]),
+    let (input_names, output_names): (&[Quantity], &[Quantity]) = match learned_step {
+        true if recipe.force == ForceInput::PerMass => (&INPUTS_PER_MASS, &OUTPUTS),
+        true => (&INPUTS, &OUTPUTS),
+        false => (&[], &[]),
     };
-    ranges("input", if damps { "possible" } else { "in training" }, inputs, input_names);
+    ranges("input", "in training", inputs, input_names);
     ranges("output", "clipped to", outputs, output_names);
 
     output!("\nrecipe, SHA-256 {}", hexadecimal(&recipe.hash));
@@ -101,7 +88,6 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     }
     match LearnedModel::new(network, false) {
         Ok(_) => Ok(()),
-        Err(_) if damps => Ok(()),
         Err(error) => Err(Problem::in_file(path, error)),
     }
 }

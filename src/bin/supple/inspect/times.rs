@@ -26,7 +26,7 @@ pub(crate) struct Times {
 impl Times {
     /// Times exact and long steps from rest, in turn, so that what else the machine does meets both.
     pub(crate) fn measured(
-        method: &Method<'static>,
+        method: &Method,
         setup: &Setup,
         scene: SceneView<'_, VecMaterial>,
         loads: &Loads<'_>,
@@ -58,13 +58,13 @@ fn timed(step: impl FnOnce() -> Status) -> f64 {
 /// A scene on its way from rest, with one method and one length of step.
 pub(crate) struct Walker {
     pub(crate) state: VecState,
-    pub(crate) step: LargeStep<'static, Vec<NodeVector>>,
+    pub(crate) step: LargeStep<Vec<NodeVector>>,
 }
 
 impl Walker {
     /// At rest; steps take `seconds`.
     pub(crate) fn new(
-        method: &Method<'static>,
+        method: &Method,
         setup: &Setup,
         scene: SceneView<'_, VecMaterial>,
         seconds: f32,

@@ -175,7 +175,7 @@ pub(crate) struct LargeTrace {
 }
 
 impl LargeTrace {
-    pub(crate) const fn new(model: &LargeModel<'_>) -> Self {
+    pub(crate) const fn new(model: &LargeModel) -> Self {
         Self {
             grid: model.grid(),
             report: *model.report(),

@@ -50,7 +50,7 @@ impl<'a> Start<'a> {
 
 /// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested. A mesh too small for the
 /// lattice that its method wants is a problem.
-pub(crate) fn grid(setup: &Setup, scene: SceneView<'_, VecMaterial>, method: &Method<'_>) -> Result<Grid, Problem> {
+pub(crate) fn grid(setup: &Setup, scene: SceneView<'_, VecMaterial>, method: &Method) -> Result<Grid, Problem> {
     let grid = method.grid(scene, &setup.body.local).map_err(|error| {
         let place = setup.time.lattice_at.as_ref().unwrap_or(&setup.body.name);
         Problem(format!("{place}: {error}"))

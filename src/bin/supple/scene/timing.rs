@@ -22,7 +22,7 @@ const MOST_FRAMES: u32 = 1_000_000;
 /// What `[time]` asks for.
 pub struct Timing {
     /// Of steps beyond the critical one; none is the exact step.
-    pub(crate) method: Option<Method<'static>>,
+    pub(crate) method: Option<Method>,
     /// A method by a name that it had once, and what to write.
     pub(crate) old_name: Option<String>,
     pub step: StepChoice,
@@ -123,7 +123,7 @@ impl Timing {
 }
 
 /// The name of a method in scene files; none is the exact step.
-pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
+pub(crate) const fn method_name(method: Option<&Method>) -> &'static str {
     match method {
         None => "exact",
         Some(_) => "long",
@@ -132,7 +132,7 @@ pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
 
 #[derive(Default)]
 struct ReadMethod {
-    method: Option<Method<'static>>,
+    method: Option<Method>,
     is_auto: bool,
     old_name: Option<String>,
 }
@@ -155,7 +155,7 @@ fn read_method(file: &SceneFile, time: &TimeTable) -> Result<ReadMethod, Problem
     Ok(ReadMethod { method, is_auto: now == "auto", old_name: (name != now).then(remark) })
 }
 
-fn read_tolerance(file: &SceneFile, time: &TimeTable, method: Option<&Method<'_>>) -> Result<Option<f32>, Problem> {
+fn read_tolerance(file: &SceneFile, time: &TimeTable, method: Option<&Method>) -> Result<Option<f32>, Problem> {
     let Some(at) = &time.tolerance else { return Ok(None) };
     let tolerance = *at.get_ref();
     if !(tolerance.is_finite() && tolerance > 0.0) {
@@ -170,7 +170,7 @@ fn read_tolerance(file: &SceneFile, time: &TimeTable, method: Option<&Method<'_>
     Ok(Some(tolerance))
 }
 
-fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Option<&Method<'_>>) -> Result<StepChoice, Problem> {
+fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Option<&Method>) -> Result<StepChoice, Problem> {
     let positive = |value: f32| value.is_finite() && value > 0.0;
     match at.get_ref() {
         StepLength::Seconds(seconds) if positive(*seconds) => Ok(StepChoice::Seconds(*seconds)),
@@ -201,11 +201,7 @@ fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Option<&Method<
 }
 
 /// The method with its lattice given by hand.
-fn with_lattice(
-    file: &SceneFile,
-    at: &Spanned<[u32; 3]>,
-    method: Option<&Method<'static>>,
-) -> Result<Method<'static>, Problem> {
+fn with_lattice(file: &SceneFile, at: &Spanned<[u32; 3]>, method: Option<&Method>) -> Result<Method, Problem> {
     let cells = *at.get_ref();
     if method.is_none() {
         let text = format!("lattice is {cells:?}, but method \"exact\" has none; \"long\" and \"auto\" have");
