@@ -1,4 +1,4 @@
-//! The kernel's tests in one crate: what they share is compiled once, and they share two cores without waiting.
+//! The kernel's tests in one crate: what they have in common is compiled once, and no core waits for the last of a few.
 
 #[path = "support/networks.rs"]
 mod networks;
