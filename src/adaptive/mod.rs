@@ -95,8 +95,8 @@ impl AdaptiveModel {
     ) -> Result<Self, InertiaError> {
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), request)?;
         let StorageParts { first, second, .. } = chooser.checked(storage, scene, points)?;
-        let mut of_first = chooser
-            .with_longest(|step| LargeModel::prepare(method.clone(), scene, points, state.reborrow(), step, first))?;
+        let mut of_first =
+            chooser.with_longest(|step| LargeModel::prepare(method, scene, points, state.reborrow(), step, first))?;
         let step = chooser.shortest()?;
         of_first.change_step(step);
         let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |mut state, step, storage| {

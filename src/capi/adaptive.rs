@@ -132,7 +132,6 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let StorageParts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
         chooser.with_longest(|longest| {
-            let method = method.clone();
             let model = LargeModel::prepare_in(first, method, scene, points, state.reborrow(), longest, of_first)?;
             model.change_step(step);
             Ok(())

@@ -313,7 +313,7 @@ impl<'w> Simulation<'w> {
             Method::Long(method) => {
                 let seconds = step.unwrap_or(LONG_STEPS * critical.seconds);
                 let step = Step::unchecked(seconds, damping)?;
-                let large = LargeStep::prepare_in_vec(method.clone(), scene.view(), points, state.view(), step)?;
+                let large = LargeStep::prepare_in_vec(*method, scene.view(), points, state.view(), step)?;
                 let guard = settings.guard.then(|| guarded(state, seconds, damping, guard::EVERY));
                 Prepared::Long(Box::new(large), guard.transpose()?)
             }
@@ -321,7 +321,7 @@ impl<'w> Simulation<'w> {
                 let seconds = step.unwrap_or(LONGEST_STEPS * critical.seconds);
                 let longest = Step::unchecked(seconds, damping)?;
                 let request = Request { tolerance: tolerance.unwrap_or_else(|| usual_tolerance(points)), longest };
-                let adaptive = Adaptive::prepare_in_vec(method.clone(), scene.view(), points, state.view(), request)?;
+                let adaptive = Adaptive::prepare_in_vec(*method, scene.view(), points, state.view(), request)?;
                 Prepared::Auto(Box::new(adaptive))
             }
             Method::Learned { network, lead_in, fallback } => {

@@ -277,7 +277,7 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
     for _ in 0..2 {
         state.reset();
         let mut large =
-            LargeStep::prepare(method.clone(), scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
+            LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
         for _ in 0..100 {
             taken += u32::from(large.step(scene.view(), &loads, state.view()) == Status::Ok);
         }

@@ -46,7 +46,7 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
     let method = given([1, 1, 2]);
     let needed = vectors_for(&method, scene.view(), &body.points).unwrap();
     for capacity in [0, needed - 1] {
-        let error = refused(method.clone(), capacity, nothing);
+        let error = refused(method, capacity, nothing);
         assert_eq!(error, InertiaError::Capacity { kind: "vectors", needed, capacity });
         said(error, &format!("the inertia needs {needed} vectors, there is room for {capacity}"));
     }

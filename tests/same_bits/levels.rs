@@ -83,17 +83,17 @@ fn compare(name: &str, element: Element, law: impl Into<AnyLaw>) {
     let methods = [("exact", None), ("long", Some(Method::new(Cells::Given([1, 1, 3]))))];
     let of_element = if element == Element::NodalStrain { 1 } else { 2 };
     for (of, method) in methods.into_iter().take(of_element) {
-        let portable = run(material, Level::Portable, method.clone());
+        let portable = run(material, Level::Portable, method);
         assert!(portable.1.iter().flatten().any(|bits| f32::from_bits(*bits).abs() > 1e-3), "nothing moved");
         for level in Level::available() {
-            let other = run(material, level, method.clone());
+            let other = run(material, level, method);
             println!("{name}, {of}: portable and {level:?} are {:.1e} m apart", apart(&portable, &other));
             if cfg!(feature = "deterministic") {
                 assert_eq!(portable, other, "{name}, {of}: portable and {level:?} differ");
             } else {
                 assert!(apart(&portable, &other) < 1e-6);
             }
-            assert_eq!(other, run(material, level, method.clone()), "{name}, {of}: two runs differ");
+            assert_eq!(other, run(material, level, method), "{name}, {of}: two runs differ");
         }
     }
 }

@@ -137,7 +137,7 @@ fn describe_exact(
 fn long_method(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Option<Method>, Problem> {
     if let Some(method) = &setup.time.method {
         grid(setup, scene, method)?;
-        return Ok(Some(method.clone()));
+        return Ok(Some(*method));
     }
     let method = Method::new(Cells::Suggested);
     let grid = method.grid(scene, &setup.body.local).map_err(Problem::of)?;

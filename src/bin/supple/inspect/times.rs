@@ -71,7 +71,7 @@ impl Walker {
     ) -> Result<Self, Problem> {
         let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
         let mut state = setup.state(scene);
-        let step = LargeStep::prepare_in_vec(method.clone(), scene, &setup.body.local, state.view(), step)
+        let step = LargeStep::prepare_in_vec(*method, scene, &setup.body.local, state.view(), step)
             .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
         Ok(Self { state, step })
     }

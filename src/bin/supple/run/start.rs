@@ -28,8 +28,8 @@ impl<'a> Start<'a> {
             grid(setup, simulation.scene().view(), method)?;
         }
         let method = match (&setup.time.method, &setup.learned) {
-            (Some(method), _) if setup.time.is_adaptive => simulation::Method::Auto(method.clone()),
-            (Some(method), _) => simulation::Method::Long(method.clone()),
+            (Some(method), _) if setup.time.is_adaptive => simulation::Method::Auto(*method),
+            (Some(method), _) => simulation::Method::Long(*method),
             (None, Some(choice)) => choice.method()?,
             (None, None) => simulation::Method::Exact,
         };
