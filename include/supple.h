@@ -233,7 +233,7 @@
 /**
  * Bytes before the arrays of a supple_large.
  */
-#define SUPPLE_LARGE_FRONT 61440
+#define SUPPLE_LARGE_FRONT 10240
 
 /**
  * Exact steps of nine tenths of the critical step, which is looked at again while tissue stiffens.

@@ -52,7 +52,7 @@ pub struct supple_adaptive {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_adaptive {
     const MAGIC: [u8; 8] = magic(b'A');
-    const FRONT: usize = 122880;
+    const FRONT: usize = 20480;
 }
 
 pub(super) fn layout(vectors: usize) -> Layout {

@@ -70,7 +70,7 @@ pub struct supple_guard {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_guard {
     const MAGIC: [u8; 8] = magic(b'G');
-    const FRONT: usize = 61440;
+    const FRONT: usize = 10752;
 }
 
 pub(super) fn layout(vectors: usize) -> Layout {

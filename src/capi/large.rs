@@ -54,11 +54,11 @@ pub struct supple_large {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_large {
     const MAGIC: [u8; 8] = magic(b'I');
-    const FRONT: usize = 61440;
+    const FRONT: usize = 10240;
 }
 
 /// Bytes before the arrays of a supple_large.
-pub const SUPPLE_LARGE_FRONT: usize = 61440;
+pub const SUPPLE_LARGE_FRONT: usize = 10240;
 const _: () = assert!(SUPPLE_LARGE_FRONT == <supple_large as Object>::FRONT);
 
 /// A configuration, checked against a scene with these points.

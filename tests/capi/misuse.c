@@ -429,7 +429,7 @@ static void networks(void) {
     LARGE(SUPPLE_E_STEP, wrong.seconds = -1.0f);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 5000);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 0);
-    REFUSED(SUPPLE_E_SHORT, supple_large_init(spare, 50000, scene, state, points[0], &calm, &no_large, &error));
+    REFUSED(SUPPLE_E_SHORT, supple_large_init(spare, 5000, scene, state, points[0], &calm, &no_large, &error));
     REFUSED(SUPPLE_E_NULL, supple_large_init(spare, sizeof spare, scene, state, NULL, &calm, &no_large, &error));
     REFUSED(SUPPLE_E_NULL, supple_large_size(scene, points[0], &calm, NULL, &error));
     DONE(supple_large_size(scene, points[0], &calm, &needed, &error));
