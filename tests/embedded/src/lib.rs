@@ -175,7 +175,7 @@ type Storage = [NodeVector; 16_000];
 
 /// Prepares a method and takes a step of it: error, inertia added and damping.
 fn large(
-    method: Method<'_>,
+    method: Method,
     scene: &Scene<Exponential>,
     state: &mut State,
     storage: &mut Storage,
