@@ -331,7 +331,7 @@ static supple_status make_large(void) {
     const supple_scene *scene = object(SCENE, 0);
     supple_state *state = object(STATE, 1);
     supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), one_in(5) ? wild(1e-2f) : 2e-3f,
-                                  one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}, NULL, 0};
+                                  one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}};
     if (one_in(3)) {
         for (int axis = 0; axis < 3; axis++) {
             config.cells[axis] = number(1 + below(3));
@@ -367,7 +367,7 @@ static supple_status make_guard(void) {
 static supple_status make_adaptive(void) {
     const supple_scene *scene = object(SCENE, 0);
     supple_state *state = object(STATE, 1);
-    const supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), one_in(5) ? wild(1e-2f) : 5e-3f, one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), one_in(5) ? wild(1e-2f) : 5e-3f, one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}};
     const float *p = points_for(nodes_of(scene));
     size_t needed = 64, bytes;
     const supple_status sized = supple_adaptive_size(scene, p, &config, one_in(60) ? NULL : &needed, wanted());
