@@ -73,11 +73,10 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
             output!("{}", layer_row(&format!("{part} {index}"), layer));
         }
     }
-    let learned_step = inputs.len() == FEATURES && outputs.len() == PREDICTED;
-    let (input_names, output_names): (&[Quantity], &[Quantity]) = match learned_step {
-        true if recipe.force == ForceInput::PerMass => (&INPUTS_PER_MASS, &OUTPUTS),
-        true => (&INPUTS, &OUTPUTS),
-        false => (&[], &[]),
+    let (input_names, output_names): (&[Quantity], &[Quantity]) = match (inputs.len(), outputs.len(), recipe.force) {
+        (FEATURES, PREDICTED, ForceInput::PerMass) => (&INPUTS_PER_MASS, &OUTPUTS),
+        (FEATURES, PREDICTED, ForceInput::Newton) => (&INPUTS, &OUTPUTS),
+        _ => (&[], &[]),
     };
     ranges("input", "in training", inputs, input_names);
     ranges("output", "clipped to", outputs, output_names);
