@@ -90,7 +90,9 @@ fn exists(test: &str, read: Read<'_>) -> Result<(), String> {
     // Whether another file has a line with this text: the one that runs the test.
     let named_by = |other: &str, name: &str| {
         let lines = read(other).unwrap_or_default();
-        if lines.lines().any(|line| !line.trim_start().starts_with(['#', '/']) && line.contains(name)) {
+        // An attribute of Rust is no comment.
+        let is_comment = |line: &str| line.starts_with('/') || (line.starts_with('#') && !line.starts_with("#["));
+        if lines.lines().any(|line| !is_comment(line.trim_start()) && line.contains(name)) {
             Ok(())
         } else {
             Err(format!("{other} does not run it"))
@@ -145,7 +147,7 @@ fn is_test(source: &str, name: &str) -> Result<(), String> {
 }
 
 /// Whether a file of `tests/` belongs to a test crate of a package: `CRATE.rs`, `CRATE/MODULE.rs`, or `PART/MODULE.rs`
-/// with the parts of tests/kernel.rs.
+/// with the parts of tests/kernel.rs; those of the laboratory belong to the tests of its library.
 fn is_compiled(file: &str, named_by: &dyn Fn(&str, &str) -> Result<(), String>) -> Result<(), String> {
     let stem = file.strip_suffix(".rs").unwrap_or(file);
     let (name, module) = stem.split_once('/').unwrap_or((stem, "main"));
@@ -154,8 +156,9 @@ fn is_compiled(file: &str, named_by: &dyn Fn(&str, &str) -> Result<(), String>) 
     if module != root && module != "main" {
         named_by(&format!("tests/{name}/{root}.rs"), &format!("mod {module};"))?;
     }
-    let name = format!("name = \"{top}\"");
-    named_by("Cargo.toml", &name)
+    let (folder, name) = (name, format!("name = \"{top}\""));
+    named_by("src/lab/lib.rs", &format!("#[path = \"../../tests/{folder}/main.rs\"]"))
+        .or_else(|_| named_by("Cargo.toml", &name))
         .or_else(|_| named_by("src/bin/supple/Cargo.toml", &name))
         .or_else(|_| named_by("src/lab/Cargo.toml", &name))
 }

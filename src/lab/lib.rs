@@ -6,6 +6,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`scenes`] | bodies, supports and loads as data; [`moving`] those that fall, turn and swing |
+//! | [`command`] | the command `supple-lab` |
 //! | [`course`] | how loads vary over time |
 //! | [`touched`] | the surface of a body where an instrument touches it |
 //! | [`timing`] | how time is counted in a scene |
@@ -28,6 +29,10 @@
 //! | `training` (feature `train`) | scenes to learn from |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
+// Where nobody reads they panic; `supple_cli::screen` has what prints.
+#![cfg_attr(not(test), deny(clippy::print_stdout, clippy::print_stderr))]
+
+pub mod command;
 pub mod cost;
 pub mod course;
 pub mod equal_error;
@@ -45,10 +50,14 @@ pub mod physics;
 pub mod pulls;
 #[path = "../train/random_numbers.rs"]
 mod random_numbers;
+mod report;
 pub mod run;
 pub mod scenes;
 pub mod sweep;
 pub mod table;
+#[cfg(test)]
+#[path = "../../tests/lab/main.rs"]
+mod tests;
 mod threads;
 pub mod timing;
 pub mod tolerance;
@@ -56,6 +65,10 @@ pub mod touched;
 #[cfg(feature = "train")]
 pub mod training;
 pub mod truth;
+
+// So that the tests read as those of a user.
+#[cfg(test)]
+extern crate self as supple_lab;
 
 use std::path::Path;
 use std::{fs, io};

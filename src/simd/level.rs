@@ -134,8 +134,20 @@ pub(crate) type Baseline = Pair<Sse2>;
 pub(crate) type Baseline = Portable<8>;
 
 /// Runs the kernel with the instructions of the current level.
+#[cfg(not(test))]
 #[inline(always)]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    at_current_level(kernel)
+}
+
+/// The tests of this crate compile only one level of all kernels: those in `tests` run the others.
+#[cfg(test)]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    with_baseline(kernel)
+}
+
+#[inline(always)]
+pub(super) fn at_current_level<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     match Level::current() {

@@ -5,7 +5,8 @@ extern crate std;
 use std::println;
 
 use super::int8::Whole;
-use super::{Kernel, Level, Real, dispatch};
+use super::level::at_current_level;
+use super::{Kernel, Level, Real};
 
 const VALUES: [f32; 16] = [
     0.0,
@@ -100,7 +101,7 @@ impl Kernel for Operations {
 
 #[test]
 fn vector_operations_give_the_bits_of_scalar_ones() {
-    let checked = dispatch(Operations);
+    let checked = at_current_level(Operations);
     println!("{:?}: {checked} results", Level::current());
     assert!(checked > 1000);
 }
@@ -145,7 +146,7 @@ impl Kernel for Integers {
 
 #[test]
 fn integer_vectors_give_the_results_of_plain_loops() {
-    let checked = dispatch(Integers);
+    let checked = at_current_level(Integers);
     println!("{:?}: {checked} results", Level::current());
     assert!(checked > 10_000);
 }

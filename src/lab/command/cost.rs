@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::cost::{HEAD, Way, evaluate, line};
 use clap::Args;
 use supple::material::Element;
 use supple_cli::element_name::element_named;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::output;
-use supple_lab::cost::{HEAD, Way, evaluate, line};
 
 #[derive(Args)]
 pub(crate) struct Asked {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::training;
 use supple::loads::{LoadsOverTime, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{Support, VecScene};
@@ -14,7 +15,6 @@ use supple_cli::scene::file::SceneFile;
 use supple_cli::scene::setup::Setup;
 use supple_cli::scene::timing::StepChoice;
 use supple_cli::screen::message;
-use supple_lab::training;
 
 /// Share of the critical step at rest that exact steps take unless the file says otherwise: it falls while the body
 /// deforms, and the steps of one training are all alike.

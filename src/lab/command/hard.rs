@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::hard::{Counts, Plan, evaluate, ordinary, press, report};
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, print};
-use supple_lab::hard::{Counts, Plan, evaluate, ordinary, press, report};
 
 use super::finish;
 use crate::report::hard;

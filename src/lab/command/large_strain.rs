@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::large_strain::{Plan, evaluate};
 use clap::Args;
 use supple::material::Element;
 use supple_cli::element_name::element_named;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output, print};
-use supple_lab::large_strain::{Plan, evaluate};
 
 #[derive(Args)]
 pub(crate) struct Asked {

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
+use crate::evaluate::{self, Plan};
+use crate::method::Method;
+use crate::{equal_error, table};
 use clap::Args;
 use supple::material::Element;
 use supple_cli::element_name::element_named;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, print};
-use supple_lab::evaluate::{self, Plan};
-use supple_lab::method::Method;
-use supple_lab::{equal_error, table};
 
 use super::finish;
 use crate::report::methods;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::physics::{Plan, evaluate, tables};
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, print};
-use supple_lab::physics::{Plan, evaluate, tables};
 
 use super::finish;
 use crate::report::physics;

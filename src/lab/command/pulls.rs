@@ -1,11 +1,11 @@
 //! `supple-lab pulls`: what a lobe does on pulls.
 
+use crate::LabError;
+use crate::pulls::registration::{FRAMES, Start, Truth, follow, start};
+use crate::pulls::{Lobe, cost, draw, share};
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output};
-use supple_lab::LabError;
-use supple_lab::pulls::registration::{FRAMES, Start, Truth, follow, start};
-use supple_lab::pulls::{Lobe, cost, draw, share};
 
 /// Tracked points.
 const POINTS: [usize; 3] = [6, 10, 20];

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::hard::{Counts, Plan};
+use crate::method::Method;
+use crate::tolerance::{evaluate, text};
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output, print};
-use supple_lab::hard::{Counts, Plan};
-use supple_lab::method::Method;
-use supple_lab::tolerance::{evaluate, text};
 
 #[derive(Args)]
 pub(crate) struct Asked {

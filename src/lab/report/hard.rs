@@ -1,11 +1,11 @@
 //! Hard cases: are runs ever wrong without a word, and do estimates of the error follow the true one?
 
+use crate::evaluate::unique;
+use crate::hard::report;
+use crate::hard::verdict::{Judged, Verdict};
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, short};
 use supple_cli::report::{Figure, Panel, ReportPart, Section};
-use supple_lab::evaluate::unique;
-use supple_lab::hard::report;
-use supple_lab::hard::verdict::{Judged, Verdict};
 
 pub(crate) const NAME: &str = "hard";
 

@@ -1,19 +1,19 @@
 //! Methods judged against the exact motion: speed against error with the Pareto front, error over step and over time,
 //! and the two figures of the paper.
 
+use crate::evaluate::{Evaluation, unique};
+use crate::method::Method;
+use crate::networks::Family;
+use crate::run::{End, Figures, Row};
+use crate::scenes::SceneSpec;
+use crate::sweep;
+use crate::truth::Truth;
+use crate::{DT, MULTIPLES};
 use supple::mesh::boundary;
 use supple_cli::report::bodies::{Bodies, View, distances, lengths, mean_millimetres, moved};
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, Plot, short};
 use supple_cli::report::{Figure, Panel, ReportPart, Section, Table};
-use supple_lab::evaluate::{Evaluation, unique};
-use supple_lab::method::Method;
-use supple_lab::networks::Family;
-use supple_lab::run::{End, Figures, Row};
-use supple_lab::scenes::SceneSpec;
-use supple_lab::sweep;
-use supple_lab::truth::Truth;
-use supple_lab::{DT, MULTIPLES};
 
 use super::peers::{BAR, NETWORK_SECONDS, PEERS, PUBLISHED};
 
@@ -418,7 +418,7 @@ mod tests {
 
     #[test]
     fn errors_are_written_as_the_paper_writes_them() {
-        let errors = supple_lab::measure::Errors { means: vec![9.0, 0.017], sd: 0.014, max: 0.032 };
+        let errors = crate::measure::Errors { means: vec![9.0, 0.017], sd: 0.014, max: 0.032 };
         let figures = Figures { errors, clip_share: 0.0, us_per_step: 1.0 };
         let row = row(End::Reached(figures));
         assert_eq!(spread(&row), "0.0170 \u{b1} 0.0140 (0.0320) mm");

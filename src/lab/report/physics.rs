@@ -1,10 +1,10 @@
 //! Elements and steps against nature: errors over computing time, of a filmed beam, closed forms and published values.
 
+use crate::evaluate::unique;
+use crate::physics::PhysicsRow;
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
 use supple_cli::report::{Figure, Panel, ReportPart, Section, Table};
-use supple_lab::evaluate::unique;
-use supple_lab::physics::PhysicsRow;
 
 pub(crate) const NAME: &str = "physics";
 
