@@ -2,7 +2,7 @@
 //! [`super::critical_bounds`] and [`super::patch_bounds`] have them of the law (1/s^2), and tangents for a coarse
 //! stiffness ([`super::tile_tangents`]). Scenes without fibres do not come here.
 
-use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, TileNodes, dispatch, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, ScatterBuffer, TILE, TileNodes, dispatch, dot};
 
 use super::critical_bounds::{Image, NodeMatrices, mass_weighted_gradients};
 use super::deformation::{Deformation, Vector};
@@ -64,17 +64,49 @@ impl<R: Real> Lengths<R> {
             self.of_x[term] = weight.fused(dot(x, x).sqrt(), self.of_x[term]);
         }
     }
+}
 
-    /// What the node with this gradient and weight gets: by Cauchy-Schwarz, as in [`super::critical_bounds`].
+/// Adds the lengths of a gradient with a weight to the sums of its element or patch.
+struct AddLengths<'a, R> {
+    lengths: &'a mut Lengths<R>,
+    bounds: &'a FibreBounds<R>,
+    deformation: &'a Deformation<R>,
+    g: Vector<R>,
+    weight: R,
+}
+
+impl<R: Real> Piece for AddLengths<'_, R> {
+    type Output = ();
+
     #[inline(always)]
-    fn matrix(&self, bounds: &FibreBounds<R>, deformation: &Deformation<R>, g: Vector<R>, weight: R) -> Symmetric<R> {
+    fn run(self) {
+        let Self { lengths, bounds, deformation, g, weight } = self;
+        lengths.add(bounds, deformation, g, weight);
+    }
+}
+
+/// What the node with this gradient and weight gets: by Cauchy-Schwarz, as in [`super::critical_bounds`].
+struct OfNode<'a, R> {
+    lengths: &'a Lengths<R>,
+    bounds: &'a FibreBounds<R>,
+    deformation: &'a Deformation<R>,
+    g: Vector<R>,
+    weight: R,
+}
+
+impl<R: Real> Piece for OfNode<'_, R> {
+    type Output = Symmetric<R>;
+
+    #[inline(always)]
+    fn run(self) -> Symmetric<R> {
+        let Self { lengths, bounds, deformation, g, weight } = self;
         let share = R::splat(1.0).divide(weight);
         let c = Image::of_cofactor(deformation, g);
-        let isotropic = share * bounds.isotropic * dot(g, g).sqrt() * self.own;
-        let mut sum = c.matrix(share * bounds.volume * self.of_c);
-        for term in 0..self.of_x.len() {
+        let isotropic = share * bounds.isotropic * dot(g, g).sqrt() * lengths.own;
+        let mut sum = c.matrix(share * bounds.volume * lengths.of_c);
+        for term in 0..lengths.of_x.len() {
             let x = Image::new(bounds.image(term, g, c.vector));
-            let matrix = x.matrix(share * bounds.stiffening[term] * self.of_x[term]);
+            let matrix = x.matrix(share * bounds.stiffening[term] * lengths.of_x[term]);
             sum = sum.plus(&matrix);
         }
         Symmetric { xx: sum.xx + isotropic, yy: sum.yy + isotropic, zz: sum.zz + isotropic, ..sum }
@@ -106,12 +138,14 @@ impl Kernel for OfElements<'_, '_> {
                 let bounds = &fibres.bounds(fibres.tile(number), first, element, deformation);
                 let (gradients, _) = mass_weighted_gradients(tile, first, &nodes, inertia);
                 let mut lengths = Lengths::zero();
-                for gradient in gradients {
-                    lengths.add(bounds, deformation, gradient, one);
+                for g in gradients {
+                    R::run_piece(AddLengths { lengths: &mut lengths, bounds, deformation, g, weight: one });
                 }
+                let lengths = &lengths;
                 let mut matrices = [Symmetric { xx: zero, yy: zero, zz: zero, xy: zero, yz: zero, zx: zero }; 4];
                 for corner in 0..4 {
-                    matrices[corner] = lengths.matrix(bounds, deformation, gradients[corner], one);
+                    let g = gradients[corner];
+                    matrices[corner] = R::run_piece(OfNode { lengths, bounds, deformation, g, weight: one });
                 }
                 sums.add_corners(&nodes, first, matrices, &mut buffers);
             }
@@ -182,8 +216,9 @@ impl OfPatches<'_, '_> {
                 for neighbour in neighbours {
                     let nodes = neighbour.nodes_below::<R>(below).unwrap_or(TileNodes::ALL_ZERO);
                     let [weight, ..] = weights.read_nodes::<R, 1>(&nodes, 0, first);
-                    let gradient = weighted_gradient(neighbour, first, &nodes, of_patch.root, inertia);
-                    of_patch.lengths.add(&of_patch.bounds, deformation, gradient, weight);
+                    let g = weighted_gradient(neighbour, first, &nodes, of_patch.root, inertia);
+                    let (lengths, bounds) = (&mut of_patch.lengths, &of_patch.bounds);
+                    R::run_piece(AddLengths { lengths, bounds, deformation, g, weight });
                     for axis in 0..3 {
                         own[axis] = own[axis] - vector_at::<R>(&neighbour.gradients[axis], first);
                     }
@@ -191,7 +226,8 @@ impl OfPatches<'_, '_> {
                 let factor = of_patch.root * mass_root::<R>(&own_nodes, first, inertia);
                 of_patch.own = [own[0] * factor, own[1] * factor, own[2] * factor];
                 let [weight, ..] = weights.read_nodes::<R, 1>(&own_nodes, 0, first);
-                of_patch.lengths.add(&of_patch.bounds, deformation, of_patch.own, weight);
+                let (lengths, bounds, g) = (&mut of_patch.lengths, &of_patch.bounds, of_patch.own);
+                R::run_piece(AddLengths { lengths, bounds, deformation, g, weight });
             }
             for neighbour in neighbours {
                 let mut buffers = [ScatterBuffer::NONE; 3];
@@ -199,15 +235,15 @@ impl OfPatches<'_, '_> {
                 for (part, OfPatch { deformation, bounds, lengths, root, .. }) in parts.iter().enumerate() {
                     let first = part * R::COUNT;
                     let [weight, ..] = weights.read_nodes::<R, 1>(&nodes, 0, first);
-                    let gradient = weighted_gradient(neighbour, first, &nodes, *root, inertia);
-                    let matrix = lengths.matrix(bounds, deformation, gradient, weight);
+                    let g = weighted_gradient(neighbour, first, &nodes, *root, inertia);
+                    let matrix = R::run_piece(OfNode { lengths, bounds, deformation, g, weight });
                     sums.add_corners(&nodes, first, [matrix], &mut buffers);
                 }
             }
             let mut buffers = [ScatterBuffer::NONE; 3];
             for (part, OfPatch { deformation, bounds, lengths, own, .. }) in parts.iter().enumerate() {
                 let [weight, ..] = weights.read_nodes::<R, 1>(&own_nodes, 0, part * R::COUNT);
-                let matrix = lengths.matrix(bounds, deformation, *own, weight);
+                let matrix = R::run_piece(OfNode { lengths, bounds, deformation, g: *own, weight });
                 sums.add_corners(&own_nodes, part * R::COUNT, [matrix], &mut buffers);
             }
         }

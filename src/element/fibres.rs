@@ -17,7 +17,7 @@ use super::extension::Distortion;
 use super::matrix::outer;
 use super::tile::vector_at;
 use crate::material::{Directions, FIBRE_TERMS, FibreTerm, Fibres, Invariants, VolumeFactor};
-use crate::simd::{Real, TILE, dot, unrolled};
+use crate::simd::{Piece, Real, TILE, dot, unrolled};
 
 /// Families of directions.
 const FAMILIES: usize = 2;
@@ -357,9 +357,11 @@ impl<'a> Fibrous<'a> {
         element: impl Fn(usize) -> usize,
         deformation: &Deformation<R>,
     ) -> FibreBounds<R> {
-        let factor = VolumeFactor::new(deformation.invariants);
-        let stretch = self.stretch(tile, first, element, &deformation.h, [factor.g, factor.less_one]);
-        FibreBounds::new(stretch, &factor, deformation)
+        let mut elements = [0; TILE];
+        for (lane, number) in elements.iter_mut().enumerate().take(R::COUNT) {
+            *number = element(lane);
+        }
+        R::run_piece(BoundsOf { fibres: *self, tile, first, elements: &elements, deformation })
     }
 
     /// Energy density (J/m^3) at place `lane` of a tile, which belongs to mesh element `element`, at the displacement
@@ -399,6 +401,29 @@ fn factor_at(h: DMat3) -> [f64; 2] {
     }
     let factor = VolumeFactor::new(Invariants { i: i as f32, j: j as f32 });
     [factor.g.into(), factor.less_one.into()]
+}
+
+/// See [`Fibrous::bounds`].
+struct BoundsOf<'a, R> {
+    fibres: Fibrous<'a>,
+    tile: &'a FibreTile,
+    first: usize,
+    /// In the lanes.
+    elements: &'a [usize; TILE],
+    deformation: &'a Deformation<R>,
+}
+
+impl<R: Real> Piece for BoundsOf<'_, R> {
+    type Output = FibreBounds<R>;
+
+    #[inline(always)]
+    fn run(self) -> FibreBounds<R> {
+        let Self { fibres, tile, first, elements, deformation } = self;
+        let factor = VolumeFactor::new(deformation.invariants);
+        let element = |lane: usize| elements[lane % TILE];
+        let stretch = fibres.stretch(tile, first, element, &deformation.h, [factor.g, factor.less_one]);
+        FibreBounds::new(stretch, &factor, deformation)
+    }
 }
 
 impl<R: Real> FibreStress<R> {

@@ -2,7 +2,6 @@
 //! `P` (Pa) of [`crate::material`], the rest volume `V` (m^3) and the gradients of the shape functions `N_a` (1/m);
 //! Miller et al. 2007. The four forces of an element add up to zero.
 
-use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::material::{AnyLaw, Invariants, Law, LawState, Laws, response_operations};
@@ -17,7 +16,7 @@ use super::ElementTile;
 use super::deformation::{Deformation, LeftOut, Matrix, edges};
 use super::extension::{Extension, NoExtension};
 use super::pressure::{OwnPressure, Pressure};
-use super::stiffness_bound::scale_of;
+use super::stiffness_bound::{MaybeBound, scale_of};
 
 /// The elements of a scene with their laws.
 #[derive(Clone, Copy)]
@@ -67,7 +66,7 @@ impl Extremes<f32> {
 pub(crate) trait ElementVisitor {
     /// Whether the scalar stiffness bound is added to the fourth component of the forces of the nodes: by
     /// [`ElementVisitor::visit`], and of patches with nodal strain by these.
-    const BOUNDS: bool = false;
+    fn bounds(&self) -> bool;
 
     /// Called for each vector of elements, those from place `first` of the tile on. Its result is added to the fourth
     /// component of the forces of their nodes.
@@ -86,6 +85,11 @@ pub(crate) trait ElementVisitor {
 pub struct NoVisitor;
 
 impl ElementVisitor for NoVisitor {
+    #[inline(always)]
+    fn bounds(&self) -> bool {
+        false
+    }
+
     #[inline(always)]
     fn visit<R: Real, L: Law>(
         &mut self,
@@ -132,9 +136,13 @@ impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
 
 impl<'a, L: Law + Into<AnyLaw>, V, P> InternalForces<'a, L, V, P> {
     /// The same with what the stress has besides that of the law.
-    pub(crate) fn with_extension<K>(self, extension: K) -> InternalForces<'a, AnyLaw, V, P, K> {
+    pub(crate) fn with_extension<K>(
+        self,
+        extension: K,
+        visitor: MaybeBound,
+    ) -> InternalForces<'a, AnyLaw, MaybeBound, P, K> {
         let Self { elements: Elements { laws, tiles, partitions: all }, pressure, partitions, .. } = self;
-        let Self { displacement, remainder, force, visitor, .. } = self;
+        let Self { displacement, remainder, force, .. } = self;
         let elements = Elements { laws: laws.any(), tiles, partitions: all };
         InternalForces { elements, pressure, partitions, displacement, remainder, force, visitor, extension }
     }
@@ -253,12 +261,8 @@ pub(crate) fn add_forces<R: Real, L: Law, V: ElementVisitor, P: Pressure, K: Ext
         }
         if K::EXTENDS {
             let batch = batch.get_mut(..count).unwrap_or_default();
-            R::run_piece(Extend::<_, V, _> {
-                batch,
-                kept: &mut kept,
-                extension: &mut *extension,
-                visitor: PhantomData,
-            });
+            let (kept, bounds) = (&mut kept, visitor.bounds());
+            R::run_piece(Extend { batch, kept, extension: &mut *extension, bounds });
         }
         let batch = batch.get(..count).unwrap_or_default();
         let force = force.reborrow();
@@ -383,26 +387,27 @@ fn visit<R: Real, L: Law>(
 type Kept<K, R> = (<K as Extension>::Local<R>, <K as Extension>::Prepared<R>);
 
 /// Between the second and the third pass, for tissue with an extension: its stress takes the place of `h`.
-struct Extend<'a, 'b, R: Real, V, K: Extension> {
+struct Extend<'a, 'b, R: Real, K: Extension> {
     batch: &'a mut [ElementVector<'b, R>],
     kept: &'a mut [Kept<K, R>],
     extension: &'a mut K,
-    visitor: PhantomData<V>,
+    /// Whether the scalar stiffness bound is asked for.
+    bounds: bool,
 }
 
-impl<R: Real, V: ElementVisitor, K: Extension> Piece for Extend<'_, '_, R, V, K> {
+impl<R: Real, K: Extension> Piece for Extend<'_, '_, R, K> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { batch, kept, extension, .. } = self;
+        let Self { batch, kept, extension, bounds } = self;
         let first_pass = if extension.prepares() { batch.len() } else { 0 };
         for (elements, (local, prepared)) in batch.iter_mut().zip(&mut *kept).take(first_pass) {
             let ElementVector { tile, first, h, invariants, .. } = *elements;
             let element = |lane: usize| tile.element(first + lane);
             let bound;
-            (*prepared, bound) = extension.prepare((tile, first), element, &h, invariants, V::BOUNDS, local);
-            if V::BOUNDS {
+            (*prepared, bound) = extension.prepare((tile, first), element, &h, invariants, bounds, local);
+            if bounds {
                 elements.fourth = scale_of::<R>(tile, first).fused(bound, elements.fourth);
             }
         }

@@ -7,8 +7,8 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::internal_forces::ElementVisitor;
 use super::{
-    CriticalBounds, ElementTangents, Extended, Extremes, InternalForces, MeanPressure, NoVisitor, OwnPressure,
-    PatchBounds, PatchForces, PatchTangents, ScalarBound, TileTangents,
+    CriticalBounds, ElementTangents, Extended, Extremes, InternalForces, MaybeBound, MeanPressure, NoVisitor,
+    OwnPressure, PatchBounds, PatchForces, PatchTangents, ScalarBound, TileTangents,
 };
 
 /// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,
@@ -90,46 +90,30 @@ pub(crate) fn tangents<L: ElementLaw>(
     }
 }
 
-/// A visitor with which the internal forces of tissue with fibres or that relaxes are compiled: once, for a law known at
-/// run time.
-pub(crate) trait ExtendedVisitor: ElementVisitor + Copy + Sync {
-    fn extended_forces(kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Extended<'_>>) -> Extremes<f32>;
-    fn extended_nodal_pressure_forces(
-        kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Extended<'_>>,
-    ) -> Extremes<f32>;
-    fn extended_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Extended<'_>>) -> Extremes<f32>;
+/// Internal forces of tissue with fibres or that relaxes: compiled once, for a law that is known at run time.
+#[inline(never)]
+pub(crate) fn extended_forces(
+    kernel: InternalForces<'_, AnyLaw, MaybeBound, OwnPressure, Extended<'_>>,
+) -> Extremes<f32> {
+    dispatch(kernel)
 }
 
-macro_rules! implement_extended {
-    ($($visitor:ty),*) => {
-        $(
-            impl ExtendedVisitor for $visitor {
-                #[inline(never)]
-                fn extended_forces(
-                    kernel: InternalForces<'_, AnyLaw, Self, OwnPressure, Extended<'_>>,
-                ) -> Extremes<f32> {
-                    dispatch(kernel)
-                }
-
-                #[inline(never)]
-                fn extended_nodal_pressure_forces(
-                    kernel: InternalForces<'_, AnyLaw, Self, MeanPressure<'_>, Extended<'_>>,
-                ) -> Extremes<f32> {
-                    dispatch(kernel)
-                }
-
-                #[inline(never)]
-                fn extended_patch_forces(kernel: PatchForces<'_, AnyLaw, Self, Extended<'_>>) -> Extremes<f32> {
-                    dispatch(kernel)
-                }
-            }
-        )*
-    };
+/// The same with nodal pressure.
+#[inline(never)]
+pub(crate) fn extended_nodal_pressure_forces(
+    kernel: InternalForces<'_, AnyLaw, MaybeBound, MeanPressure<'_>, Extended<'_>>,
+) -> Extremes<f32> {
+    dispatch(kernel)
 }
-implement_extended!(NoVisitor, ScalarBound);
+
+/// The same with nodal strain.
+#[inline(never)]
+pub(crate) fn extended_patch_forces(kernel: PatchForces<'_, AnyLaw, MaybeBound, Extended<'_>>) -> Extremes<f32> {
+    dispatch(kernel)
+}
 
 /// A visitor with which the internal forces of every law are compiled.
-pub(crate) trait ForcesVisitor<L: ElementLaw>: ExtendedVisitor {
+pub(crate) trait ForcesVisitor<L: ElementLaw>: ElementVisitor + Copy + Sync {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
     fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32>;

@@ -42,7 +42,9 @@ mod tile_tangents;
 pub use fibres::FibreTile;
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
-pub(crate) use kernels::{ForcesVisitor, tangents};
+pub(crate) use kernels::{
+    ForcesVisitor, extended_forces, extended_nodal_pressure_forces, extended_patch_forces, tangents,
+};
 pub use node::{Axes, NodeInertia};
 pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
@@ -80,7 +82,7 @@ pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use relaxation::{Relaxing, Series, VECTORS_OF_TERM};
 pub(crate) use relaxation_energy::Remembered;
-pub(crate) use stiffness_bound::ScalarBound;
+pub(crate) use stiffness_bound::{MaybeBound, ScalarBound};
 pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
 
 use crate::material::Material;

@@ -9,8 +9,8 @@ use bytemuck::must_cast_slice_mut;
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, NumberBuffer, Real, Scatter, ScatterBuffer, ScatterNumbers, TILE, TileNodes, dispatch,
-    unrolled,
+    Gather, Kernel, NodeVector, NumberBuffer, Piece, Real, Scatter, ScatterBuffer, ScatterNumbers, TILE, TileNodes,
+    dispatch, unrolled,
 };
 
 use super::deformation::{Deformation, LeftOut, Matrix, Vector, edges};
@@ -302,6 +302,27 @@ impl Sums for Changes<'_> {
     }
 }
 
+/// What of the change and the volume of elements goes to a corner, to the first tissue there and to the second.
+struct ShareOfTissues<'a, R> {
+    tile: &'a ElementTile,
+    first: usize,
+    corner: usize,
+    change: R,
+    volume: R,
+}
+
+impl<R: Real> Piece for ShareOfTissues<'_, R> {
+    type Output = [R; 4];
+
+    #[inline(always)]
+    fn run(self) -> [R; 4] {
+        let Self { tile, first, corner, change, volume } = self;
+        let is = |slot: u8| R::from_fn(|lane| f32::from(u8::from(tile.slot(corner, first + lane) == slot)));
+        let (one, other) = (is(0), is(1));
+        [one * change, one * volume, other * change, other * volume]
+    }
+}
+
 /// Change and volume of the two tissues at a node.
 struct ChangesAndVolumes<'a>(Scatter<'a>);
 
@@ -321,9 +342,7 @@ impl Sums for ChangesAndVolumes<'_> {
 
     #[inline(always)]
     fn share<R: Real>((tile, first, corner): (&ElementTile, usize, usize), change: R, volume: R) -> [R; 4] {
-        let is = |slot: u8| R::from_fn(|lane| f32::from(u8::from(tile.slot(corner, first + lane) == slot)));
-        let (one, other) = (is(0), is(1));
-        [one * change, one * volume, other * change, other * volume]
+        R::run_piece(ShareOfTissues { tile, first, corner, change, volume })
     }
 
     #[inline(always)]

@@ -10,18 +10,17 @@
 //! and its own node the opposite and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`. Crushed elements add
 //! an energy of their own ([`super::barrier`]).
 
-use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::material::{AnyLaw, Law, LawState, Laws, Potential};
-use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, Scatter, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::extension::{Extension, NoExtension};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
 use super::patch_deformation::{GradientLengths, gradient};
-use super::stiffness_bound::{Coefficients, scalar_bound_of_patches};
+use super::stiffness_bound::{Coefficients, MaybeBound, scalar_bound_of_patches};
 use super::tile::vector_at;
 
 /// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and
@@ -37,14 +36,14 @@ pub struct PatchForces<'a, L, V, K = NoExtension> {
     /// What rounding has left out of the displacements, or nothing.
     pub(crate) remainder: &'a [NodeVector],
     pub(crate) force: Scatter<'a>,
-    pub(crate) visitor: PhantomData<V>,
+    pub(crate) visitor: V,
     pub(crate) extension: K,
 }
 
 impl<'a, L: Law + Into<AnyLaw>, V> PatchForces<'a, L, V> {
     /// The same with what the stress has besides that of the law.
-    pub(crate) fn with_extension<K>(self, extension: K) -> PatchForces<'a, AnyLaw, V, K> {
-        let Self { laws, patches, partitions, displacement, remainder, force, visitor, extension: NoExtension } = self;
+    pub(crate) fn with_extension<K>(self, extension: K, visitor: MaybeBound) -> PatchForces<'a, AnyLaw, MaybeBound, K> {
+        let Self { laws, patches, partitions, displacement, remainder, force, .. } = self;
         PatchForces { laws: laws.any(), patches, partitions, displacement, remainder, force, visitor, extension }
     }
 }
@@ -70,17 +69,17 @@ impl<L: Law, V: ElementVisitor, K: Extension> Kernel for PatchForces<'_, L, V, K
 fn add_all<R: Real, L: Law, V: ElementVisitor, K: Extension, const PARTS: usize>(
     kernel: PatchForces<'_, L, V, K>,
 ) -> Extremes<f32> {
-    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, mut extension, .. } = kernel;
+    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, visitor, mut extension } = kernel;
     let moved = [displacement, remainder].map(Gather::new);
     let mut extremes = Extremes::<R>::none();
     for tile in patches.touching(partitions) {
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress =
-                stress_of::<R, L, V, K>(&laws, tile, neighbours, part * R::COUNT, moved, &mut extension, &mut extremes);
+            let (first, asked) = (part * R::COUNT, (visitor.bounds(), &mut extension));
+            *stress = stress_of::<R, L, K>(&laws, tile, neighbours, first, moved, asked, &mut extremes);
         }
-        scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
+        scatter::<R, PARTS>(tile, neighbours, stresses, visitor.bounds(), &mut force);
     }
     if K::EXTENDS {
         extremes.saturation = extremes.saturation.max(R::splat(extension.saturation()));
@@ -116,13 +115,13 @@ impl<R: Real> Stress<R> {
 }
 
 #[inline(always)]
-fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
+fn stress_of<R: Real, L: Law, K: Extension>(
     laws: &Laws<'_, L>,
     tile: &PatchTile,
     neighbours: &[Neighbours],
     first: usize,
     moved: [Gather<'_>; 2],
-    extension: &mut K,
+    (bounds, extension): (bool, &mut K),
     extremes: &mut Extremes<R>,
 ) -> Stress<R> {
     let (h, pull) = gradient::<R>(tile, neighbours, first, moved);
@@ -133,11 +132,10 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
     extremes.least_change = deformation.invariants.j.min(extremes.least_change);
     extremes.saturation = response.saturation.max(extremes.saturation);
     let modulus = modulus_of::<R, L>(&law);
-    let (place, element) = ((tile, first), |lane| tile.element(first + lane));
-    let stabilising = extension.stabilising(modulus, element);
-    let (scalars, of_law) = ([response.p1, response.s], K::of_law(&local));
-    let (prepared, bound) = extension.prepare(place, element, &h, deformation.invariants, V::BOUNDS, &of_law);
-    let mut p = extension.stress(place, element, &deformation, scalars, &of_law, &prepared);
+    let stabilising = extension.stabilising(modulus, |lane| tile.element(first + lane));
+    let (deformation, scalars, of_law) = (&deformation, [response.p1, response.s], K::of_law(&local));
+    let stress = Extend { tile, first, deformation, scalars, of_law, bounds, extension };
+    let (mut p, bound) = if K::EXTENDS { R::run_piece(stress) } else { stress.run() };
     for i in 0..3 {
         for j in 0..3 {
             p[i][j] = p[i][j] - stabilising * h[i][j];
@@ -145,26 +143,51 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor, K: Extension>(
     }
     let own = [stabilising * pull[0], stabilising * pull[1], stabilising * pull[2]];
     let stress = Stress { p, own, ..Stress::zero() };
-    if !V::BOUNDS {
+    if !bounds {
         return stress;
     }
     let lengths = GradientLengths::<R>::of(neighbours, first);
     let scale = lengths.sum * vector_at::<R>(&tile.inverse_volumes, first);
     let coefficients = Coefficients::new::<L>(&law, &local).less(modulus);
-    let mut scalar = scalar_bound_of_patches(&coefficients, &deformation, scale);
+    let mut scalar = scalar_bound_of_patches(&coefficients, deformation, scale);
     if K::EXTENDS {
         scalar = scale.fused(bound, scalar);
     }
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }
 
+/// The stress of a vector of patches and what the scalar stiffness bound gains (Pa), if it is asked for.
+struct Extend<'a, 'b, R: Real, K: Extension> {
+    tile: &'a PatchTile,
+    first: usize,
+    deformation: &'b Deformation<R>,
+    scalars: [R; 2],
+    of_law: K::Local<R>,
+    bounds: bool,
+    extension: &'b mut K,
+}
+
+impl<R: Real, K: Extension> Piece for Extend<'_, '_, R, K> {
+    type Output = (Matrix<R>, R);
+
+    #[inline(always)]
+    fn run(self) -> (Matrix<R>, R) {
+        let Self { tile, first, deformation, scalars, of_law, bounds, extension } = self;
+        let (place, element) = ((tile, first), |lane| tile.element(first + lane));
+        let (h, invariants) = (&deformation.h, deformation.invariants);
+        let (prepared, bound) = extension.prepare(place, element, h, invariants, bounds, &of_law);
+        (extension.stress(place, element, deformation, scalars, &of_law, &prepared), bound)
+    }
+}
+
 /// Adds the forces of a tile, neighbour by neighbour, those of the patches in the order of their places whatever the
 /// width of a vector.
 #[inline(always)]
-fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
+fn scatter<R: Real, const PARTS: usize>(
     tile: &PatchTile,
     neighbours: &[Neighbours],
     mut stresses: [Stress<R>; PARTS],
+    bounds: bool,
     force: &mut Scatter<'_>,
 ) {
     let zero = R::splat(0.0);
@@ -175,7 +198,7 @@ fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
             let first = part * R::COUNT;
             let gradient = neighbour.gradient::<R>(first);
             let mut row = [zero; 4];
-            if V::BOUNDS {
+            if bounds {
                 row[3] = stress.scalar * dot(gradient, gradient).root();
             }
             for i in 0..3 {

@@ -238,7 +238,10 @@ pub(super) fn spatial_bound<R: Real>(coefficients: &Coefficients<R>, deformation
 pub struct ScalarBound;
 
 impl ElementVisitor for ScalarBound {
-    const BOUNDS: bool = true;
+    #[inline(always)]
+    fn bounds(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn visit<R: Real, L: Law>(
@@ -250,5 +253,28 @@ impl ElementVisitor for ScalarBound {
         local: &LawState<R>,
     ) -> R {
         scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, scale_of(tile, first))
+    }
+}
+
+/// The same if it is true, else nothing: known at run time, so that loops that are seldom used are compiled once.
+#[derive(Clone, Copy)]
+pub(crate) struct MaybeBound(pub(crate) bool);
+
+impl ElementVisitor for MaybeBound {
+    #[inline(always)]
+    fn bounds(&self) -> bool {
+        self.0
+    }
+
+    #[inline(always)]
+    fn visit<R: Real, L: Law>(
+        &mut self,
+        law: &L::Wide<R>,
+        tile: &ElementTile,
+        first: usize,
+        deformation: &Deformation<R>,
+        local: &LawState<R>,
+    ) -> R {
+        if self.0 { ScalarBound.visit::<R, L>(law, tile, first, deformation, local) } else { R::splat(0.0) }
     }
 }

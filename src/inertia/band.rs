@@ -308,14 +308,14 @@ fn product<R: Real>(part: &Part, lines: &[Part; PANEL]) -> Part {
 }
 
 /// Replaces right sides by solutions, from the factor.
-pub(super) fn solve<const X: usize>(band: &Band, factor: &[f32], x: [&mut Row; X]) {
+pub(super) fn solve(band: &Band, factor: &[f32], x: &mut [&mut Row]) {
     dispatch(Solve { band, factor, x });
 }
 
-struct Solve<'a, const X: usize> {
+struct Solve<'a, 'b> {
     band: &'a Band,
     factor: &'a [f32],
-    x: [&'a mut Row; X],
+    x: &'a mut [&'b mut Row],
 }
 
 #[inline(always)]
@@ -348,12 +348,12 @@ fn sums_of_rows<R: Real>(rows: &[Part; PANEL]) -> Part {
     out
 }
 
-impl<const X: usize> Kernel for Solve<'_, X> {
+impl Kernel for Solve<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Self { band, factor, mut x } = self;
+        let Self { band, factor, x } = self;
         let square_of = |panel: usize| {
             let mut square = [[0.0; PANEL]; PANEL];
             for (r, part) in square.iter_mut().enumerate() {
@@ -366,7 +366,7 @@ impl<const X: usize> Kernel for Solve<'_, X> {
         for panel in 0..band.panels() {
             let (first, start) = (panel * PANEL, band.start(panel));
             let square = square_of(panel);
-            for x in &mut x {
+            for x in x.iter_mut() {
                 let mut rows = [[0.0; PANEL]; PANEL];
                 for (r, row) in rows.iter_mut().enumerate() {
                     let entries = band.columns(factor, first + r, start * PANEL, first).as_chunks::<PANEL>().0;
@@ -389,7 +389,7 @@ impl<const X: usize> Kernel for Solve<'_, X> {
         for panel in (0..band.panels()).rev() {
             let (first, start) = (panel * PANEL, band.start(panel));
             let square = square_of(panel);
-            for x in &mut x {
+            for x in x.iter_mut() {
                 let side = part_of(x, panel);
                 let mut rows = square;
                 for row in &mut rows {

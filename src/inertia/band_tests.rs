@@ -86,7 +86,7 @@ fn a_factor_solves_as_a_dense_one_in_float64() {
             row.iter_mut().zip(right).for_each(|(x, right)| *x = *right as f32);
         }
         let [first, second] = &mut rows;
-        solve(&band, &factor, [first, second]);
+        solve(&band, &factor, &mut [first, second]);
         let mut worst = 0.0_f64;
         for (row, right) in rows.iter().zip(&right) {
             let exact = solved(&matrix, right);

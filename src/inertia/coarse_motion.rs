@@ -37,7 +37,7 @@ impl CoarseSpace<'_, '_> {
     pub(super) fn solve(&self, forces: &mut CoarseVectors) {
         let mut row: Row = [0.0; _];
         self.write_components(forces, &mut row);
-        solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut row]);
+        solve(&self.renewal.bands.vectors, self.matrices.factor, &mut [&mut row]);
         self.write_vectors(&row, forces);
     }
 
@@ -47,7 +47,7 @@ impl CoarseSpace<'_, '_> {
         let (mut a, mut b): (Row, Row) = ([0.0; _], [0.0; _]);
         self.write_components(first, &mut a);
         self.write_components(second, &mut b);
-        solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut a, &mut b]);
+        solve(&self.renewal.bands.vectors, self.matrices.factor, &mut [&mut a, &mut b]);
         self.write_vectors(&a, first);
         self.write_vectors(&b, second);
     }

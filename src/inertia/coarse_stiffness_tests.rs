@@ -272,7 +272,7 @@ fn is_the_sum<M: ElementMaterial>(name: &str, prepared: &Prepared<'_, '_, M>) {
         sum.iter().map(|row| row.iter().fold(0.0_f64, |most, x| most.max(x.abs())) * random.next()).collect();
     let mut x: Row = [0.0; _];
     x.iter_mut().zip(&right).for_each(|(x, right)| *x = *right as f32);
-    solve(&prepared.renewal.bands.vectors, prepared.matrices.factor, [&mut x]);
+    solve(&prepared.renewal.bands.vectors, prepared.matrices.factor, &mut [&mut x]);
     let solved: Vec<f64> = x.iter().take(right.len()).copied().map(f64::from).collect();
     let rest: Vec<f64> = times(&sum, &solved).iter().zip(&right).map(|(a, b)| a - b).collect();
     println!("{name}: solved with a rest of {:.1e}", size(&rest) / size(&right));

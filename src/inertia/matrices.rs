@@ -211,7 +211,7 @@ impl<'a> Matrices<'a> {
             for (value, vector) in row.iter_mut().zip(&*vectors).take(functions) {
                 *value = vector.0[axis];
             }
-            solve(band, factors.next().unwrap_or_default(), [&mut row]);
+            solve(band, factors.next().unwrap_or_default(), &mut [&mut row]);
             for (value, vector) in row.iter().zip(&mut *vectors).take(functions) {
                 vector.0[axis] = *value;
             }

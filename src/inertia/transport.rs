@@ -78,7 +78,7 @@ pub(super) fn turned_part(
         row.iter_mut().zip(&sums).take(lattice.functions()).for_each(|(value, sum)| *value = sum.0[axis]);
     }
     let [x, y, z] = &mut rows;
-    solve(band, factor, [x, y, z]);
+    solve(band, factor, &mut [x, y, z]);
     let mut turned = [NodeVector::ZERO; _];
     for (function, turned) in turned.iter_mut().enumerate().take(lattice.functions()) {
         let at = |row: &Row| row.get(function).copied().unwrap_or_default();

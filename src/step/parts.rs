@@ -2,13 +2,13 @@
 //! the total force on each node (N) and the sums over the nodes; when all parts have these, the moves of the nodes.
 
 use core::array::from_fn;
-use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
     AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extended, Extremes, Fibrous, ForcesVisitor,
-    InternalForces, LOOK_CYCLE, Look, MARKED, MeanPressure, NoExtension, NodalVolumes, NodeInertia, OwnPressure,
-    PatchForces, Relaxing, Series, each_marked, is_marked_at, mask_of, masks, masks_mut,
+    InternalForces, LOOK_CYCLE, Look, MARKED, MaybeBound, MeanPressure, NoExtension, NodalVolumes, NodeInertia,
+    OwnPressure, PatchForces, Relaxing, Series, each_marked, extended_forces, extended_nodal_pressure_forces,
+    extended_patch_forces, is_marked_at, mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::material::Material;
@@ -277,9 +277,9 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     let elements = scene.elements();
     // Seen by the compiler, which then leaves these kernels out where no tissue can relax or has fibres.
     let (fibres, past) = (scene.fibrous(), past.filter(|_| scene.vectors_of_tile() > 0));
-    let is_extended = fibres.is_some() || past.is_some();
+    let (is_extended, bounds) = (fibres.is_some() || past.is_some(), MaybeBound(visitor.bounds()));
     if scene.element().is_nodal_strain() {
-        let (laws, patches, visitor) = (elements.laws, scene.patches, PhantomData);
+        let (laws, patches) = (elements.laws, scene.patches);
         let ([displacement, remainder], of) = (moved, partitions.clone());
         let scatter = Scatter::from(elements.partitions.nodes(&of).start, &mut *force);
         let kernel = PatchForces {
@@ -294,11 +294,11 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
         };
         let mut extremes = if is_extended {
             let extension = extension_of(patches.tiles(), fibres, past);
-            V::extended_patch_forces(kernel.with_extension(extension))
+            extended_patch_forces(kernel.with_extension(extension, bounds))
         } else {
             V::patch_forces(kernel)
         };
-        let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS);
+        let least = crushed_forces(scene, partitions, displacement, volumes, force, bounds.0);
         extremes.least_change = extremes.least_change.min(least);
         extremes
     } else if scene.element().is_nodal_pressure() {
@@ -306,7 +306,7 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
         let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
         if is_extended {
             let extension = extension_of(scene.tiles, fibres, past);
-            V::extended_nodal_pressure_forces(kernel.with_extension(extension))
+            extended_nodal_pressure_forces(kernel.with_extension(extension, bounds))
         } else {
             V::nodal_pressure_forces(kernel)
         }
@@ -314,7 +314,7 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
         let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
         if is_extended {
             let extension = extension_of(scene.tiles, fibres, past);
-            V::extended_forces(kernel.with_extension(extension))
+            extended_forces(kernel.with_extension(extension, bounds))
         } else {
             V::forces(kernel)
         }
