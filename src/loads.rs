@@ -323,6 +323,15 @@ impl<'a> Loads<'a> {
         if cfg!(feature = "contact") { self.pulls.as_ref() } else { None }
     }
 
+    /// The longest way (m) of an instrument or of the target of a pull, from this time (s) on in so many seconds.
+    pub(crate) fn way(&self, time: f64, seconds: f32) -> f32 {
+        let end = time + f64::from(seconds);
+        let pulls = self.pulls.iter().flat_map(Pulls::acting);
+        let targets = pulls.map(|(_, pull)| pull.target(end).distance(pull.target(time)));
+        let instruments = self.contact.iter().flat_map(|contact| contact.instruments());
+        targets.chain(instruments.map(|instrument| instrument.way([time, end]))).fold(0.0, f32::max)
+    }
+
     pub(crate) const fn nodes(&self) -> Option<usize> {
         self.nodes
     }

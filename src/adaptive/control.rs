@@ -24,6 +24,10 @@ const HALF_LIFE: f32 = 0.2;
 const REST: [f32; 2] = [0.05, 1.6];
 const PROBE: f32 = 0.04;
 const PROBE_COMPARISONS: u32 = 8;
+/// An instrument or the target of a pull that comes by so many tolerances in a step, and twice as fast as any in the last
+/// [`HALF_LIFE`] or so, is met by exact steps.
+const LONG_WAY: f32 = 4.0;
+const FASTER: f32 = 2.0;
 /// Most halvings: more are beyond single precision in any case.
 const MOST: u32 = 16;
 
@@ -52,6 +56,8 @@ pub(super) struct Control {
     rest: f32,
     /// Largest mean distance in the present probe, m.
     distance: f32,
+    /// Of the fastest instrument or target, m/s, halved every [`HALF_LIFE`].
+    speed: f32,
 }
 
 /// While exact steps move the first run, the second run takes some steps now and then, to see whether they would do.
@@ -77,6 +83,7 @@ impl Control {
             probe: Probe::Begins,
             rest: REST[0],
             distance: 0.0,
+            speed: 0.0,
         }
     }
 
@@ -104,6 +111,19 @@ impl Control {
         self.seconds += seconds;
         let kept = libm::exp2f(-seconds / self.half_life);
         self.left_behind = self.left_behind.map(|error| kept * error);
+    }
+
+    /// Instruments and targets go this way (m) in the next step of so many seconds. Gives whether exact steps are to meet them,
+    /// and not the step beyond the critical one which was to come, with these estimates of the mean and the largest error.
+    pub(super) fn meets(&mut self, way: f32, seconds: f32, errors: [f32; 2]) -> bool {
+        let (before, speed) = (libm::exp2f(-seconds / HALF_LIFE) * self.speed, way / seconds);
+        self.speed = speed.max(before);
+        let meets = exceeds(way, LONG_WAY * self.tolerance) && speed > FASTER * before && self.halvings().is_some();
+        if meets {
+            self.shorten(MOST, errors);
+            self.probe = Probe::Begins;
+        }
+        meets
     }
 
     /// Whether a probe begins with the next step.

@@ -7,6 +7,9 @@
 //! comparison. A change of length computes all inertia anew in the next step and changes neither displacements nor
 //! velocities.
 //!
+//! What instruments and targets of pulls are going to do in a step is known beforehand: where one begins to move far, exact steps
+//! meet it. What begins within a step without that, as a support or a force that the host changes, shows when it is over.
+//!
 //! What a span of time costs is bounded: it is never cut in more steps than exact ones need, and between two
 //! comparisons the length changes once at most. No step makes an error undone that is there already: where the estimate
 //! exceeds the tolerance the status is [`Status::Inexact`], until the body has forgotten the error.
@@ -333,7 +336,9 @@ impl AdaptiveView<'_> {
                 return;
             }
             taken.exact += 1;
-            control.wait(state.last_step());
+            let seconds = state.last_step();
+            control.wait(seconds);
+            let _ = control.meets(loads.way(state.time() - f64::from(seconds), seconds), seconds, [0.0; 2]);
             let [mean, _] = control.left_behind();
             worst = worst.worse(judged(status, mean, tolerance));
             if control.probes() {
@@ -392,8 +397,14 @@ impl AdaptiveView<'_> {
             if work.is_spent() {
                 return Ok(worst);
             }
-            work.long_step();
             let loads = loads.of_step(&state, seconds, count - done);
+            let estimate = self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
+            let way = loads.way(state.time(), seconds);
+            if self.chooser.control.meets(way, seconds, estimate) {
+                self.change(scene, None, state, threads, taken);
+                return Ok(worst);
+            }
+            work.long_step();
             let Some(StorageParts { first, second, .. }) = self.chooser.parts(self.storage) else {
                 return Err(mismatch);
             };

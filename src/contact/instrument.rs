@@ -52,6 +52,12 @@ impl<'a> Instrument<'a> {
     }
 
     /// Where it is at `time`, s.
+    /// How far it goes between two times (s), m.
+    pub(crate) fn way(&self, times: [f64; 2]) -> f32 {
+        let [from, to] = times.map(|time| self.placement(time).position);
+        from.distance(to)
+    }
+
     pub(super) fn placement(&self, time: f64) -> Placement {
         let [start, end] = self.times;
         let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).clamp(0.0, 1.0) };

@@ -173,6 +173,11 @@ impl Envelope {
         }
     }
 
+    /// What is allowed at present, m.
+    pub(super) fn allowed_at_present(&self) -> f32 {
+        self.allowed(self.estimate().map_or(0.0, |estimate| estimate.mean))
+    }
+
     /// The status of a step that was taken.
     pub(super) fn judge(&self, taken: Status) -> Status {
         self.estimate().map_or(taken, |Estimate { mean, allowed, .. }| judged(taken, mean, allowed))

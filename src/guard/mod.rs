@@ -46,6 +46,11 @@ pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;
 
+/// A body whose kinetic energy has become so many times the largest at the latest comparisons, and which in one step moves by
+/// more than is allowed for an error, is compared at once: something has begun to act of which they know nothing. That
+/// energy is taken to fall by [`FADES`] from one comparison to the next.
+const SUDDEN: f64 = 4.0;
+const FADES: f64 = 0.5;
 /// Lengths of its steps by which the second run may be behind the first.
 const MOST_BEHIND: f64 = 2.0;
 /// Relative error of times that are sums of steps.
@@ -104,6 +109,8 @@ pub(crate) struct Watch {
     seen: Option<Mark>,
     envelope: Envelope,
     pushes: Pushes,
+    /// The largest kinetic energy of the first run at the latest comparisons, J.
+    kinetic: f64,
     /// Whether the first run takes exact steps at present.
     is_exact: bool,
 }
@@ -186,6 +193,7 @@ impl Watch {
                 seen,
                 envelope,
                 pushes: Pushes::default(),
+                kinetic: 0.0,
                 is_exact: false,
             },
         ))
@@ -278,7 +286,7 @@ impl GuardView<'_> {
         threads: &impl Threads,
     ) -> Status {
         let Self { second: large, watch, storage } = self;
-        let Watch { progress, nodes, longest, interval, seen, envelope, pushes, is_exact } = watch;
+        let Watch { progress, nodes, longest, interval, seen, envelope, pushes, kinetic, is_exact } = watch;
         let nodes = *nodes;
         if !taken.is_taken() {
             return taken;
@@ -303,15 +311,22 @@ impl GuardView<'_> {
             start_from(&state, &mut second);
             let newton = loads.with_pushes_of(&state, 1.0).sum_of_given();
             *pushes = Pushes { newton, compared: newton, ..Pushes::default() };
+            *kinetic = state.energy_balance.kinetic;
             return taken;
         }
+        let now = state.energy_balance.kinetic;
+        let is_sudden = now > SUDDEN * *kinetic
+            && !*is_exact
+            && mean_length(nodes, state.increment) > envelope.allowed_at_present();
         pushes.enter(loads.with_pushes_of(&state, 1.0).sum_of_given(), gone as f32);
-        if gone <= 0.0 || gone < (1.0 - ROUNDING) * f64::from(*interval) {
+        if gone <= 0.0 || (gone < (1.0 - ROUNDING) * f64::from(*interval) && !is_sudden) {
             envelope.wait(gone as f32);
             return envelope.judge(taken);
         }
-        // At the start a load may begin within a step, of which the first run's first step knows nothing.
-        let parts = if envelope.is_new() || gone > (1.0 + ROUNDING) * f64::from(*longest) { 2 } else { 1 };
+        // A load may have begun within a step, of which the first run's first step knows nothing.
+        let is_late = gone > (1.0 + ROUNDING) * f64::from(*longest);
+        let parts = if envelope.is_new() || is_sudden || is_late { 2 } else { 1 };
+        *kinetic = now.max(FADES * *kinetic);
         // The instruments are the first run's: the second one has their impulse.
         let times = pushes.take(if *is_exact { *longest } else { state.last_step() }, *is_exact);
         let loads = &loads.with_pushes_of(&state, times);

@@ -220,14 +220,26 @@ impl Pull {
 }
 
 /// The most force (N) of a pull on these nodes unless the host says otherwise: three quarters of the shear modulus on a face
-/// of the cube that has the volume of the nodes' own tissue. Twice as much tears nodal strain where points with errors come and go. Infinite
-/// for tissue without a modulus.
+/// of the cube that has the volume of the nodes' own tissue, with the mean modulus there. Twice as much tears nodal strain where
+/// points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
 #[must_use]
 pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
-    let Some(tissue) = scene.material.tissue(0) else { return f32::INFINITY };
-    let volume: f32 = nodes.iter().map(|pulled| scene.node_volume(pulled.node as usize)).sum();
-    let edge = libm::cbrtf(volume);
-    0.75 * Moduli::of(&tissue.law).shear as f32 * edge * edge
+    let is_sorted = nodes.is_sorted_by_key(|pulled| pulled.node);
+    let is_pulled = |node: u32| match is_sorted {
+        true => nodes.binary_search_by_key(&node, |pulled| pulled.node).is_ok(),
+        false => nodes.iter().any(|pulled| pulled.node == node),
+    };
+    let (mut volume, mut stiffness) = (0.0_f32, 0.0_f32);
+    for (tile, lane) in scene.places() {
+        let corners = (0..4).filter(|&corner| is_pulled(tile.node(corner, lane) as u32)).count();
+        if let Some(tissue) = scene.material.tissue(tile.element(lane)).filter(|_| corners > 0) {
+            let share = 0.25 * corners as f32 * tile.volume::<f32>(lane);
+            volume += share;
+            stiffness += share * Moduli::of(&tissue.law).shear as f32;
+        }
+    }
+    // 3/4 G V^(2/3) with G V the sum.
+    if volume > 0.0 { 0.75 * stiffness / libm::cbrtf(volume) } else { f32::INFINITY }
 }
 
 /// Whether a coordinate (m) or a weight is one.

@@ -112,6 +112,40 @@ fn damping_comes_back_from_displacements_over_time() {
     }
 }
 
+/// Springs in place of supports, a pull and an instrument that move, a start at rest: with each, what the scene has.
+#[test]
+fn whatever_acts_in_a_scene_acts_in_its_fit_over_time() {
+    let spring = "[[spring]]\nplane = { axis = \"z\", at = 0.0 }\nstiffness = 20.0\n";
+    let pull = "[[pull]]\npoint = [0.01, 0.01, 0.05]\nstiffness = 50.0\n\
+                path = [[0.0, 0.01, 0.01, 0.05], [0.1, 0.01, 0.018, 0.05]]\n";
+    let ball = "[[instrument]]\nshape = \"sphere\"\nradius = 0.006\npath = [[0.0, 0.01, 0.027, 0.04], [0.1, 0.01, 0.022, 0.04]]\n";
+    for (name, more, settle) in [
+        ("springs", spring, ""),
+        ("a pull", pull, ""),
+        ("an instrument", ball, ""),
+        ("a start at rest", "", "settle = 1e-5\n"),
+    ] {
+        let desk = Desk::new();
+        let mut model = scene([2, 2, 5], more) + settle;
+        if name == "springs" {
+            model = model.replace("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n", "");
+        }
+        let mut all = String::new();
+        for end in ["0.06", "0.1", "0.15"] {
+            let text = measured(&desk, &model.replace("end = 1.0", &format!("end = {end}")), 0.0, end);
+            all += if all.is_empty() { &text } else { text.split_once('\n').unwrap().1 };
+        }
+        desk.write("points.csv", &all);
+        desk.write("model.toml", &model);
+        let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+        assert_eq!(said.code, 0, "{name}: {}", said.err);
+        let result = result(&desk);
+        let (value, rms) = (&result["parameters"][0]["value"], result["residuals"]["rms_m"].as_f64().unwrap());
+        println!("{name}: {value} of {YOUNG} Pa, residuals {:.4} mm", 1e3 * rms);
+        assert!((value.as_f64().unwrap() / YOUNG - 1.0).abs() < 0.01 && rms < 2e-5, "{name}: {value}, {rms} m");
+    }
+}
+
 /// Share and time of relaxation, and when the film starts: 12 ms late.
 #[test]
 fn relaxation_comes_back_from_displacements_over_time() {

@@ -96,7 +96,8 @@ fn a_step_may_be_left_to_the_tolerance() {
         println!("{asked}{error:.4} mm of {:.1} off, {adaptive}", far(&desk));
         assert!(far(&desk) > 5.0 && error < figure("tolerance_mm"), "{error} {adaptive}");
         assert!((figure("tolerance_mm") - millimetres).abs() < 1e-3, "{adaptive}");
-        assert_eq!((&summary["method"], summary["time_s"].as_f64().map(f64::round)), (&"auto".into(), Some(2.0)));
+        let time = summary["time_s"].as_f64().unwrap();
+        assert!(summary["method"] == "auto" && (time - 1.5).abs() < 1e-6, "{summary}");
         assert!(figure("steps_beyond_critical") > 0.0 && figure("changes") > 0.0, "{adaptive}");
         assert!(said.out.contains(" beyond the critical step, ") && said.out.contains("tolerance "), "{}", said.out);
         steps.push(summary["steps"].as_u64().unwrap());

@@ -190,3 +190,33 @@ fn the_points_of_a_body_that_turns_turn_with_it() {
     println!("settled {:.4} mm off, moved {:.4}, points not turned {:.2}", 1e3 * settled, 1e3 * moved, 1e3 * without);
     assert!(settled < 1e-5 && moved < 2e-5 && without > 1e-3);
 }
+
+/// The usual limit is that of the tissue at the pull, whatever the order of the elements, and whatever masses it carries.
+#[test]
+fn the_usual_limit_is_that_of_the_tissue_at_the_pull() {
+    let [soft, stiff] =
+        [500.0, 5_000.0].map(|c| VecMaterial::one(Element::NodalStrain, NeoHookean { c, d: 20.0 * c }, 1000.0));
+    let far =
+        |points: &[[f32; 3]], tet: &[u32; 4]| tet.iter().map(|&node| points[node as usize][2]).sum::<f32>() > 0.24;
+    let limit = |is_reversed: bool, [near_tissue, far_tissue]: [&VecMaterial; 2]| {
+        let (points, mut tets): (Vec<_>, Vec<_>) = (BAR.points().collect(), BAR.tets().collect());
+        if is_reversed {
+            tets.reverse();
+        }
+        let mut material = near_tissue.clone();
+        material.tissues.push(far_tissue.tissues[0]);
+        material.of_element = tets.iter().map(|tet| u16::from(far(&points, tet))).collect();
+        let mut bar = Simulation::new(points, tets, material, &[]).unwrap();
+        let pull = bar.pull([0.015, 0.015, 0.11], 0.012, 500.0).unwrap();
+        bar.pulls[pull].most
+    };
+    let alone = limit(false, [&stiff, &stiff]);
+    let [below, above, reversed] =
+        [limit(false, [&soft, &stiff]), limit(false, [&stiff, &soft]), limit(true, [&stiff, &soft])];
+    println!("{alone} N in stiff tissue, {above} and {reversed} in soft tissue beside it, {below} beside soft tissue");
+    assert!(
+        (below / alone - 1.0).abs() < 1e-4
+            && (10.0 * above / alone - 1.0).abs() < 1e-4
+            && (reversed / above - 1.0).abs() < 1e-5
+    );
+}

@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod hostile;
+mod late;
 mod stiff;
 
 use supple::inertia;

@@ -11,6 +11,7 @@ use super::points::Followed;
 use crate::problem::Problem;
 use crate::report::simulation::shape;
 use crate::rest::{Unrest, at_rest};
+use crate::run::Running;
 use crate::run::start::Start;
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
@@ -126,12 +127,6 @@ impl Case {
         let setup = Setup::read(&file)?;
         let samples = measured::read(&fit.resolve(table.measured.get_ref()))
             .map_err(|problem| fit.problem(&table.measured, problem))?;
-        let timed = samples.iter().filter(|sample| sample.time.is_some()).count();
-        if timed > 0 && !setup.instruments.is_empty() {
-            return Err(
-                fit.problem(&table.scene, "scenes with instruments cannot be fitted yet; remove [[instrument]]")
-            );
-        }
         let mut left_out = vec![false; samples.len()];
         match table.left_out.as_ref().map(|at| (at, at.get_ref())) {
             None => {}
@@ -179,21 +174,20 @@ impl Case {
         unknown.scene.as_ref().is_none_or(|scene| *scene == self.scene)
     }
 
-    /// Displacements of the samples at their times, from rest and by the method of the scene, which starts at `clock` (s)
-    /// of these.
+    /// Displacements of the samples at their times, with all that acts in the scene and by its method, which starts at
+    /// `clock` (s) of these.
     fn over_time(&self, setup: &Setup, clock: f64) -> Result<Vec<[f64; 3]>, Problem> {
-        let Start { mut simulation, .. } = Start::new(setup, false)?;
+        let mut running = Running::begin(setup, Start::new(setup, false)?, &|_| ())?;
         let time = |index: usize| (self.samples[index].time.unwrap_or_default() - clock).max(0.0);
         let mut order: Vec<usize> = (0..self.samples.len()).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
         let mut found = vec![[0.0; 3]; self.samples.len()];
         for index in order {
-            let mut loads = setup.loads(simulation.scene())?;
-            let report = simulation.advance_under(time(index), &mut loads, &mut |_| {}).map_err(Problem::of)?;
-            if let supple::step::Status::Diverged(divergence) = report.status {
+            running.reach(time(index), f64::INFINITY)?;
+            if let Some(divergence) = running.outcome.divergence {
                 return Err(Problem(format!("{}: the simulation {divergence}", self.name)));
             }
-            found[index] = self.points[index].displacement(&shape(simulation.state()));
+            found[index] = self.points[index].displacement(&shape(running.simulation.state()));
         }
         Ok(found)
     }

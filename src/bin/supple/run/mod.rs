@@ -34,30 +34,16 @@ pub(crate) fn run<'a>(
     tick: &'a dyn Fn(f64),
     frame: &mut dyn FnMut(&mut Simulation<'_>) -> Result<(), Problem>,
 ) -> Result<(Simulation<'a>, Outcome), Problem> {
-    let Start { at_rest, step, simulation } = start;
-    let time = &setup.time;
-    let mut outcome = Outcome::new(at_rest, step.seconds());
-    outcome.points = FollowedPoints::new(&setup.points);
-    outcome.reactions = Reactions::new(setup.instruments.all.len(), time);
-    outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
-    outcome.learned = simulation.learned_step().map(LearnedTrace::new);
-    if simulation.auto_step().is_some() {
-        // They begin as exact ones.
-        outcome.steps.0 = outcome.steps.0.min(Pace::SHARE * at_rest.seconds);
-        outcome.steps.1 = outcome.steps.0;
-    }
-    // Time goes in even intervals, each one step or one of a network, unless exact steps alone set their own pace.
+    let step = start.step;
+    let mut running = Running::begin(setup, start, tick)?;
+    let (time, simulation) = (&setup.time, &running.simulation);
+    // Time goes in even intervals, each one step or one of a network, unless steps set their own pace.
     let interval = simulation.learned_step().map_or(step.seconds(), |learned| learned.seconds());
     let total = (time.end / f64::from(interval)).round().max(1.0) as u64;
-    let is_even = !(time.sets_own_pace() && setup.learned.is_none());
+    let is_auto = simulation.auto_step().is_some();
+    let is_even = !(is_auto || time.sets_own_pace() && setup.learned.is_none());
     // No two frames of one state.
     let frames = if is_even { total.min(time.frames.into()) } else { time.frames.into() };
-    let loads = setup.loads(simulation.scene())?;
-    let limits = setup.pulls.limit(simulation.scene().view());
-    let mut running = Running { setup, simulation, loads, limits, outcome, tick, taken: 0 };
-    if let Some(metre) = time.settle {
-        running.settle(metre)?;
-    }
     running.outcome.enter_frame(running.simulation.state());
     running.read_points()?;
     frame(&mut running.simulation)?;
@@ -69,7 +55,8 @@ pub(crate) fn run<'a>(
             let target = (total as f64 * share).round() as u64;
             running.take_until(target, interval)?;
         } else {
-            running.reach(time.end * share)?;
+            // Adaptive steps are judged at least so often.
+            running.reach(time.end * share, if is_auto { f64::from(interval) } else { f64::INFINITY })?;
         }
         running.outcome.spent += clock.elapsed();
         if running.outcome.divergence.is_some() {
@@ -81,21 +68,44 @@ pub(crate) fn run<'a>(
     Ok((running.simulation, running.outcome))
 }
 
-struct Running<'a> {
+/// A simulation on its way.
+pub(crate) struct Running<'a> {
     setup: &'a Setup,
-    simulation: Simulation<'a>,
+    pub(crate) simulation: Simulation<'a>,
     /// Without instruments and pulls.
     loads: Loads<'a>,
     /// The most force of each pull, N.
     limits: Vec<f32>,
-    outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// Is told the time now and then, s.
     tick: &'a dyn Fn(f64),
     /// Intervals of even length so far.
     taken: u64,
 }
 
-impl Running<'_> {
+impl<'a> Running<'a> {
+    /// At the start: settled, where the scene asks for it.
+    pub(crate) fn begin(setup: &'a Setup, start: Start<'a>, tick: &'a dyn Fn(f64)) -> Result<Self, Problem> {
+        let Start { at_rest, step, simulation } = start;
+        let mut outcome = Outcome::new(at_rest, step.seconds());
+        outcome.points = FollowedPoints::new(&setup.points);
+        outcome.reactions = Reactions::new(setup.instruments.all.len(), &setup.time);
+        outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
+        outcome.learned = simulation.learned_step().map(LearnedTrace::new);
+        if simulation.auto_step().is_some() {
+            // They begin as exact ones.
+            outcome.steps.0 = outcome.steps.0.min(Pace::SHARE * at_rest.seconds);
+            outcome.steps.1 = outcome.steps.0;
+        }
+        let loads = setup.loads(simulation.scene())?;
+        let limits = setup.pulls.limit(simulation.scene().view());
+        let mut running = Self { setup, simulation, loads, limits, outcome, tick, taken: 0 };
+        if let Some(metre) = setup.time.settle {
+            running.settle(metre)?;
+        }
+        Ok(running)
+    }
+
     /// To rest to within so many metres, under the loads of the start.
     fn settle(&mut self, metre: f32) -> Result<(), Problem> {
         let rounding = self.rounding();
@@ -123,12 +133,14 @@ impl Running<'_> {
         Ok(())
     }
 
-    /// Exact steps of their own pace to a time (s), along the parts of the paths of instruments and targets.
-    fn reach(&mut self, target: f64) -> Result<(), Problem> {
-        let mut from = self.simulation.state().time();
-        while from < target && self.outcome.divergence.is_none() {
-            let now = from + self.rounding();
-            let until = target.min(self.setup.instruments.next_turn(now)).min(self.setup.pulls.next_turn(now));
+    /// To a time (s), by steps of whatever length, along the parts of the paths of instruments and targets, in calls of so many
+    /// seconds at most.
+    pub(crate) fn reach(&mut self, target: f64, most: f64) -> Result<(), Problem> {
+        let (mut from, rounding) = (self.simulation.state().time(), self.rounding());
+        while from + rounding < target && self.outcome.divergence.is_none() {
+            let now = from + rounding;
+            let turn = self.setup.instruments.next_turn(now).min(self.setup.pulls.next_turn(now));
+            let until = target.min(from + most).min(turn);
             self.advance_from(from, until)?;
             from = until;
         }

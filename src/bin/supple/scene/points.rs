@@ -56,8 +56,10 @@ impl ScenePoints {
 
     /// What is outside the mesh and how far, with the place of its entry.
     pub(crate) fn warnings(&self, file: &SceneFile) -> Vec<String> {
+        /// m; a point on the surface may be outside by rounding.
+        const LEAST: f32 = 5e-6;
         let points = self.followed.as_ref().map_or(&[][..], VecPoints::points);
-        let entries = file.scene.point.iter().zip(&self.names).zip(points).filter(|(_, point)| point.distance > 0.0);
+        let entries = file.scene.point.iter().zip(&self.names).zip(points).filter(|(_, point)| point.distance > LEAST);
         let warning = |((at, name), distance): ((&Spanned<PointTable>, &String), f32)| {
             let message =
                 format!("point {name:?} is {:.2} mm outside the mesh: it follows the nearest point", 1e3 * distance);
