@@ -1,6 +1,8 @@
 //! `supple unloaded`: the mesh that it finds comes to rest, under the loads, in the shape of the scene's mesh.
 
-use super::Desk;
+use supple::mesh::Bar;
+
+use super::{Desk, Said};
 
 /// A bar of 20 x 20 x 50 mm, in mm, that is fixed at z = 0; under gravity across it sags by a fifth of its length.
 fn scene(mesh: &str, c: f64) -> String {
@@ -13,30 +15,62 @@ fn scene(mesh: &str, c: f64) -> String {
 }
 
 const BAR: &str = "shape = \"bar\"\nsize = [20.0, 20.0, 50.0]\ncells = [2, 2, 5]";
+const FOUND: &str = "file = \"unloaded.vtu\"";
+const IMAGE: Bar = Bar { size: [0.02, 0.02, 0.05], cells: [2, 2, 5] };
 
-#[test]
-fn under_the_loads_the_unloaded_mesh_has_the_shape_of_the_image() {
-    let desk = Desk::new();
-    desk.write("image.toml", &scene(BAR, 3000.0));
+/// The nodes of the image that are on the plane x = 0.
+fn nodes_of_the_side() -> String {
+    let nodes = IMAGE.points().enumerate().filter(|(_, point)| point[0] == 0.0).map(|(node, _)| node.to_string());
+    format!("nodes = [{}]", nodes.collect::<Vec<_>>().join(", "))
+}
+
+fn unloaded(desk: &Desk, image: &str) -> Said {
+    desk.write("image.toml", image);
     let said = desk.supple(&["unloaded", "image.toml", "--out", "unloaded.vtu"]);
+    println!("{}{}", said.out, said.err);
     assert_eq!(said.code, 0, "{}", said.err);
-    println!("{}", said.out);
-    let count =
-        said.out.lines().find_map(|line| line.strip_prefix("simulations")).unwrap().trim().parse::<u32>().unwrap();
-    assert!(count <= 8, "{count}");
+    said
+}
 
-    let run = desk.simulate(&scene("file = \"unloaded.vtu\"", 3000.0), &[]);
+/// How far a run of a scene ends from the image at the worst node, and how far it begins from it, m.
+fn gap_and_sag(desk: &Desk, scene: &str) -> (f64, f64) {
+    let run = desk.simulate(scene, &["--force"]);
     assert_eq!(run.code, 0, "{}", run.err);
-    let image = supple::mesh::Bar { size: [0.02, 0.02, 0.05], cells: [2, 2, 5] };
     let (mut gap, mut sag) = (0.0f64, 0.0f64);
-    for ([_, x, y, z, ux, uy, uz], to) in desk.last().into_iter().zip(image.points()) {
+    for ([_, x, y, z, ux, uy, uz], to) in desk.last().into_iter().zip(IMAGE.points()) {
         let apart =
             |point: [f64; 3]| (0..3).map(|axis| (point[axis] - f64::from(to[axis])).powi(2)).sum::<f64>().sqrt();
         (gap, sag) = (gap.max(apart([x + ux, y + uy, z + uz])), sag.max(apart([x, y, z])));
     }
     println!("sag {sag}, gap {gap} m");
+    (gap, sag)
+}
+
+#[test]
+fn under_the_loads_the_unloaded_mesh_has_the_shape_of_the_image() {
+    let desk = Desk::new();
+    let said = unloaded(&desk, &scene(BAR, 3000.0));
+    let count =
+        said.out.lines().find_map(|line| line.strip_prefix("simulations")).unwrap().trim().parse::<u32>().unwrap();
+    assert!(count <= 8, "{count}");
+    let (gap, sag) = gap_and_sag(&desk, &scene(FOUND, 3000.0));
     assert!(gap < 0.12e-3, "{gap}");
     assert!(sag > 8e-3, "{sag}");
+}
+
+#[test]
+fn loads_on_areas_are_those_of_the_unloaded_mesh() {
+    let side = nodes_of_the_side();
+    for load in [
+        format!("[[pressure]]\n{side}\npascal = 60.0\n[time]"),
+        format!("[[traction]]\n{side}\npascal = [0.0, 60.0, 0.0]\n[time]"),
+        format!("[[spring]]\n{side}\nper_area = 1e5\n[time]"),
+    ] {
+        let desk = Desk::new();
+        unloaded(&desk, &scene(BAR, 3000.0).replace("[time]", &load));
+        let (gap, _) = gap_and_sag(&desk, &scene(FOUND, 3000.0).replace("[time]", &load));
+        assert!(gap < 0.12e-3, "{load}: {gap}");
+    }
 }
 
 #[test]

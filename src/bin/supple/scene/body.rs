@@ -10,8 +10,11 @@ use super::file::{MeshTable, SceneFile};
 use crate::problem::Problem;
 
 /// A mesh in metres, and what the kernel sees of it.
+#[derive(Clone)]
 pub struct Body {
     pub(crate) mesh: TetMesh,
+    /// Where boxes and planes find the nodes (m), if not where they are.
+    pub(crate) found_at: Option<Vec<[f64; 3]>>,
     /// Coordinates less `centre`, which float32 holds better than the corner of a room.
     pub(crate) local: Vec<[f32; 3]>,
     /// m.
@@ -37,13 +40,20 @@ impl Body {
         let (low, high) = extent(&mesh.points);
         let centre = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
         let local = mesh.points.iter().map(|&point| relative(point, centre)).collect();
-        Self { mesh, local, centre, winding, name }
+        Self { mesh, found_at: None, local, centre, winding, name }
     }
 
-    /// The same body with its nodes elsewhere (m), about the same centre.
-    pub(crate) fn move_to(&mut self, points: &[[f64; 3]]) {
-        self.mesh.points = points.to_vec();
-        self.local = points.iter().map(|&point| self.local_point(point)).collect();
+    /// The same body with its nodes elsewhere (m), about the same centre. Boxes and planes find them where they were.
+    pub(crate) fn moved_to(&self, points: &[[f64; 3]]) -> Self {
+        let mut moved = self.clone();
+        moved.local = points.iter().map(|&point| self.local_point(point)).collect();
+        moved.found_at = Some(std::mem::replace(&mut moved.mesh.points, points.to_vec()));
+        moved
+    }
+
+    /// Where boxes and planes find the nodes, m.
+    pub(crate) fn places(&self) -> &[[f64; 3]] {
+        self.found_at.as_ref().unwrap_or(&self.mesh.points)
     }
 
     /// Coordinates less the centre, m.
@@ -81,8 +91,7 @@ impl Body {
     }
 
     pub(crate) fn diagonal(&self) -> f64 {
-        let (low, high) = extent(&self.mesh.points);
-        (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f64>().sqrt()
+        diagonal(&self.mesh.points)
     }
 
     /// Of each element, m^3, whichever way it is turned.
@@ -136,6 +145,12 @@ pub(crate) fn extent(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
         }
     }
     range
+}
+
+/// Of the box around points.
+pub(super) fn diagonal(points: &[[f64; 3]]) -> f64 {
+    let (low, high) = extent(points);
+    (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
 pub(crate) fn read_body(file: &SceneFile, at: &Spanned<MeshTable>) -> Result<Body, Problem> {

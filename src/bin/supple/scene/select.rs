@@ -2,7 +2,7 @@
 
 use toml::Spanned;
 
-use super::body::{Body, extent};
+use super::body::{Body, diagonal, extent};
 use super::file::{AxisName, SceneFile, Selection};
 use crate::problem::Problem;
 
@@ -17,7 +17,7 @@ pub(crate) fn select<T>(
     selection: &Selection<'_>,
     body: &Body,
 ) -> Result<Vec<u32>, Problem> {
-    let points = &body.mesh.points;
+    let points = body.places();
     let chosen: Vec<_> = match selection {
         Selection { nodes: Some(nodes), plane: None, bounds: None } => {
             if let Some(node) = nodes.get_ref().iter().find(|node| **node as usize >= points.len()) {
@@ -59,7 +59,7 @@ pub(crate) fn inside<T>(
     if plane.is_some() == bounds.is_some() {
         return Err(file.problem(at, format!("give exactly one of {other}, plane and box")));
     }
-    let tolerance = ON_PLANE * body.diagonal();
+    let tolerance = ON_PLANE * diagonal(body.places());
     Ok(move |point: [f64; 3]| {
         let on_plane = plane.is_none_or(|plane| {
             let axis = match plane.axis {

@@ -47,8 +47,12 @@ pub struct Setup {
 
 impl Setup {
     pub fn read(file: &SceneFile) -> Result<Self, Problem> {
+        Self::with_body(file, read_body(file, &file.scene.mesh)?)
+    }
+
+    /// The scene with this body in place of its own.
+    pub(crate) fn with_body(file: &SceneFile, body: Body) -> Result<Self, Problem> {
         let scene = &file.scene;
-        let body = read_body(file, &scene.mesh)?;
         let gravity = file.gravity()?;
         if let Some(at) = &scene.damping
             && let damping = *at.get_ref()

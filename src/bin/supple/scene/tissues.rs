@@ -274,7 +274,7 @@ impl<'a> Table<'a> {
         } else {
             let inside = inside(file, at, &Selection { nodes: None, plane, bounds }, "tags", body)?;
             let middle = |tet: [u32; 4]| {
-                let corners = tet.map(|node| body.mesh.points[node as usize]);
+                let corners = tet.map(|node| body.places()[node as usize]);
                 [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0)
             };
             let tets = body.mesh.tets.iter().enumerate();
