@@ -208,7 +208,9 @@ impl Setup {
     /// The longest time over which a load rises, s.
     pub(crate) fn longest_ramp(&self) -> f32 {
         let forces = self.forces.iter().map(|force| force.ramp);
-        forces.chain(self.motions.iter().map(|motion| motion.ramp)).fold(0.0, f32::max)
+        let pressures = self.pressures.surfaces.iter().map(|pressure| pressure.ramp);
+        let motions = self.motions.iter().map(|motion| motion.ramp);
+        forces.chain(pressures).chain(motions).fold(0.0, f32::max)
     }
 
     /// What acts on the scene.
