@@ -14,7 +14,7 @@ use flate2::write::ZlibEncoder;
 use super::replace::replace;
 
 /// The mesh and its fields at one time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Frame<'a> {
     /// Coordinates, in the unit in which ParaView shall show them.
     pub points: &'a [[f64; 3]],
@@ -26,6 +26,10 @@ pub struct Frame<'a> {
     pub point_scalars: &'a [(&'a str, &'a [f32])],
     /// Named scalars, one for each tetrahedron.
     pub cell_scalars: &'a [(&'a str, &'a [f32])],
+    /// Named vectors, one for each tetrahedron, such as [`TetMesh::vectors`](super::TetMesh::vectors).
+    pub cell_vectors: &'a [(&'a str, &'a [[f32; 3]])],
+    /// [`TetMesh::regions`](super::TetMesh::regions); none if empty.
+    pub regions: &'a [i32],
 }
 
 /// Writes one frame as a `.vtu` file, atomically as [`write_atomically`](super::write_atomically) does, but for power
@@ -48,6 +52,14 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     for (name, values) in frame.cell_scalars {
         check(name, values.len(), n_tets, "tetrahedra")?;
         arrays.add(name, "Float32", 1, values.iter().map(|x| x.to_le_bytes()))?;
+    }
+    for (name, values) in frame.cell_vectors {
+        check(name, values.len(), n_tets, "tetrahedra")?;
+        arrays.add(name, "Float32", 3, values.as_flattened().iter().map(|x| x.to_le_bytes()))?;
+    }
+    if !frame.regions.is_empty() {
+        check("region", frame.regions.len(), n_tets, "tetrahedra")?;
+        arrays.add("region", "Int32", 1, frame.regions.iter().map(|x| x.to_le_bytes()))?;
     }
     arrays.close("CellData");
     write_cells(path, frame.points, ("tetrahedron", frame.tets, 10), arrays)

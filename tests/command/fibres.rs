@@ -21,7 +21,7 @@ const SHAPE: &str = "shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 
 const FIBRES: &str = "fibres = [2000.0, 5.0]";
 
 /// The bar as a legacy VTK file, with vectors by cell.
-fn vtk(vectors: &str) -> String {
+pub(super) fn vtk(vectors: &str) -> String {
     let (points, tets): (Vec<_>, Vec<_>) = (BAR.points().collect(), BAR.tets().collect());
     let mut text =
         format!("# vtk DataFile Version 3.0\nbar\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n", points.len());

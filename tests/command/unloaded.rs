@@ -2,6 +2,7 @@
 
 use supple::mesh::Bar;
 
+use super::fibres::vtk;
 use super::{Desk, Said};
 
 /// A bar of 20 x 20 x 50 mm, in mm, that is fixed at z = 0; under gravity across it sags by a fifth of its length.
@@ -71,6 +72,32 @@ fn loads_on_areas_are_those_of_the_unloaded_mesh() {
         let (gap, _) = gap_and_sag(&desk, &scene(FOUND, 3000.0).replace("[time]", &load));
         assert!(gap < 0.12e-3, "{load}: {gap}");
     }
+}
+
+#[test]
+fn the_mesh_keeps_the_tags_and_the_fibres_of_the_image() {
+    let desk = Desk::new();
+    // Stiff at the lower half.
+    let tags = IMAGE.tets().map(|tet| {
+        if tet.iter().any(|&node| IMAGE.points().nth(node as usize).unwrap()[2] > 0.026) { "1\n" } else { "7\n" }
+    });
+    let tags = format!("SCALARS region int 1\nLOOKUP_TABLE default\n{}", tags.collect::<String>());
+    desk.write("bar.vtk", &(vtk("0.3 0 1") + &tags));
+    let with_file = |mesh: &str| {
+        scene(mesh, 3000.0).replace("scale = 0.001\n", "").replace(
+            "[[fix]]",
+            "fibres = [2000.0, 5.0]\n[directions]\nfibre = \"fibre\"\n[[region]]\ntags = [7]\nc = 6000.0\n[[fix]]",
+        )
+    };
+    unloaded(&desk, &with_file("file = \"bar.vtk\""));
+    let said = desk.supple(&["inspect", "unloaded.vtu"]);
+    assert!(
+        said.code == 0 && said.out.lines().any(|line| line.starts_with("region tags") && line.contains('7')),
+        "{}",
+        said.out
+    );
+    let (gap, sag) = gap_and_sag(&desk, &with_file(FOUND));
+    assert!(gap < 0.12e-3 && sag > 2e-3, "{gap} {sag}");
 }
 
 #[test]

@@ -4,7 +4,9 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use supple::io::{Frame, TetMesh, read_mesh, read_surface, write_atomically, write_pvd, write_triangles, write_vtu};
+use supple::io::{
+    CellVectors, Frame, TetMesh, read_mesh, read_surface, write_atomically, write_pvd, write_triangles, write_vtu,
+};
 
 fn mesh() -> TetMesh {
     read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vtk_raw.vtu")).unwrap()
@@ -40,16 +42,22 @@ fn a_frame_comes_back_with_its_fields() {
     let displacement: Vec<[f32; 3]> = mesh.points.iter().map(|p| p.map(|x| 0.1 * x as f32)).collect();
     let distance: Vec<f32> = (0..mesh.points.len()).map(|i| i as f32 / 3.0).collect();
     let stress: Vec<f32> = (0..mesh.tets.len()).map(|i| 1000.0 + i as f32).collect();
+    let fibre: Vec<[f32; 3]> = (0..mesh.tets.len()).map(|i| [1.0, 0.25 * i as f32, -0.5]).collect();
+    let regions: Vec<i32> = (0..mesh.tets.len() as i32).map(|i| i - 3).collect();
     let frame = Frame {
         points: &mesh.points,
         tets: &mesh.tets,
         point_vectors: &[("displacement", &displacement)],
         point_scalars: &[("a < \"b\" & c", &distance)],
         cell_scalars: &[("von Mises stress", &stress)],
+        cell_vectors: &[("fibre", &fibre)],
+        regions: &regions,
     };
     write_vtu(&path, &frame).unwrap();
     let back = read_mesh(&path).unwrap();
-    assert_eq!((back.points, back.tets), (mesh.points, mesh.tets));
+    assert_eq!((back.points, back.tets, back.regions), (mesh.points, mesh.tets, regions));
+    let values = fibre.iter().map(|vector| vector.map(f64::from)).collect();
+    assert_eq!(back.vectors, [CellVectors { name: "fibre".into(), values }]);
     let bytes = fs::read(&path).unwrap();
     assert_eq!(field(&bytes, "displacement"), displacement.as_flattened());
     assert_eq!(field(&bytes, "a &lt; &quot;b&quot; &amp; c"), distance);
@@ -64,7 +72,7 @@ fn arrays_of_several_blocks() {
     let tets: Vec<[u32; 4]> = (0..100_000).map(|i| [i % 50_000, (i * 7) % 50_000, 3, i / 2]).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("large.vtu");
-    let frame = Frame { points: &points, tets: &tets, point_vectors: &[], point_scalars: &[], cell_scalars: &[] };
+    let frame = Frame { points: &points, tets: &tets, ..Frame::default() };
     write_vtu(&path, &frame).unwrap();
     let back = read_mesh(&path).unwrap();
     assert_eq!((back.points, back.tets), (points, tets));
@@ -75,13 +83,8 @@ fn what_does_not_fit_is_refused_and_nothing_written() {
     let mesh = mesh();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frame.vtu");
-    let frame = Frame {
-        points: &mesh.points,
-        tets: &mesh.tets,
-        point_vectors: &[],
-        point_scalars: &[],
-        cell_scalars: &[("stress", &[1.0, 2.0])],
-    };
+    let frame =
+        Frame { points: &mesh.points, tets: &mesh.tets, cell_scalars: &[("stress", &[1.0, 2.0])], ..Frame::default() };
     let error = write_vtu(&path, &frame).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::InvalidInput);
     assert_eq!(error.to_string(), "the field \"stress\" has 2 values for 24 tetrahedra");

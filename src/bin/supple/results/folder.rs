@@ -73,6 +73,7 @@ impl Folder {
             point_vectors: &[("displacement", &displacement), ("velocity", &velocity)],
             point_scalars: &[("pressure", &pressure)],
             cell_scalars: if setup.tissues.relax() { &cells[1..] } else { &cells },
+            ..Frame::default()
         };
         write_vtu(&self.path(&name), &frame).map_err(Problem::of)?;
         self.frames.push((state.time(), name));

@@ -83,24 +83,29 @@ pub(crate) fn unloaded(asked: &Asked) -> Result<End, Problem> {
     Ok(End::Reached)
 }
 
-/// The mesh as `.vtu`, with the displacement to the image at its nodes and the regions of its elements.
+/// The mesh as `.vtu`, with the displacement to the image at its nodes, and the regions and vectors of its elements.
 fn write(asked: &Asked, file: &SceneFile, image: &TetMesh, found: &Found) -> Result<(), Problem> {
     let scale = file.scene.mesh.get_ref().scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
     let points: Vec<_> = found.points.iter().map(|point| point.map(|metre| metre / scale)).collect();
     let to_image = found.points.iter().zip(&image.points);
     let to_image: Vec<_> =
         to_image.map(|(from, to)| [0, 1, 2].map(|axis| ((to[axis] - from[axis]) / scale) as f32)).collect();
-    let regions: Vec<f32> = image.regions.iter().map(|&region| region as f32).collect();
-    let of_elements: &[(&str, &[f32])] = if regions.is_empty() { &[] } else { &[("region", &regions)] };
+    let vectors: Vec<Vec<[f32; 3]>> = image.vectors.iter().map(|vectors| single(&vectors.values)).collect();
+    let vectors: Vec<_> = image.vectors.iter().zip(&vectors).map(|(of, values)| (&of.name[..], &values[..])).collect();
     let frame = Frame {
         points: &points,
         tets: &image.tets,
         point_vectors: &[("to_image", &to_image)],
-        point_scalars: &[],
-        cell_scalars: of_elements,
+        cell_vectors: &vectors,
+        regions: &image.regions,
+        ..Frame::default()
     };
     supple::io::write_vtu(&asked.out, &frame)
         .map_err(|error| Problem::in_file(&asked.out, format!("cannot be written: {error}")))
+}
+
+fn single(vectors: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    vectors.iter().map(|vector| vector.map(|component| component as f32)).collect()
 }
 
 struct Search<'a> {
