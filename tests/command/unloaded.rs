@@ -101,6 +101,37 @@ fn the_mesh_keeps_the_tags_and_the_fibres_of_the_image() {
 }
 
 #[test]
+fn what_is_found_by_place_is_told_with_what_to_write() {
+    let desk = Desk::new();
+    let wall = "axis = [0.0, 0.0, 1.0]\nthrough = [0.01, 0.1, 0.0]\nhelix = [60.0, -60.0]";
+    let region = "box = { min = [-1.0, -1.0, 0.025], max = [0.012, 1.0, 1.0] }";
+    let traction = "plane = { axis = \"x\", at = 0.0 }";
+    let with_places = |mesh: &str| {
+        let (region, traction) = (
+            format!("[[region]]\n{region}\nc = 2000.0"),
+            format!("[[traction]]\n{traction}\npascal = [0.0, 60.0, 0.0]"),
+        );
+        let directions = format!("fibres = [4000.0, 5.0]\n[directions]\n{wall}\n{region}\n{traction}\n[[fix]]");
+        scene(mesh, 3000.0).replace("[[fix]]", &directions)
+    };
+    let said = unloaded(&desk, &with_places(BAR));
+    for words in [
+        "line 15: by the mesh without loads its fibres",
+        "line 19: on the mesh without loads its box",
+        "line 22: on the mesh without loads its box",
+    ] {
+        assert!(said.err.contains(words), "{words}");
+    }
+    let told = with_places(FOUND)
+        .replace(wall, "fibre = \"wall_fibre\"\nsheet = \"wall_sheet\"")
+        .replace(region, "tags = [1]")
+        .replace(traction, &nodes_of_the_side());
+    assert!(said.err.contains("write tags = [1] in its place") && said.err.contains(&nodes_of_the_side()));
+    let (gap, _) = gap_and_sag(&desk, &told);
+    assert!(gap < 0.12e-3, "{gap}");
+}
+
+#[test]
 fn bodies_that_no_unloaded_mesh_can_bear_are_refused() {
     let desk = Desk::new();
     desk.write("image.toml", &scene(BAR, 50.0));

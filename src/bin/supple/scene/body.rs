@@ -13,7 +13,7 @@ use crate::problem::Problem;
 #[derive(Clone)]
 pub struct Body {
     pub(crate) mesh: TetMesh,
-    /// Where boxes and planes find the nodes (m), if not where they are.
+    /// Where boxes, planes and walls find the nodes (m), if not where they are.
     pub(crate) found_at: Option<Vec<[f64; 3]>>,
     /// Coordinates less `centre`, which float32 holds better than the corner of a room.
     pub(crate) local: Vec<[f32; 3]>,
@@ -43,7 +43,7 @@ impl Body {
         Self { mesh, found_at: None, local, centre, winding, name }
     }
 
-    /// The same body with its nodes elsewhere (m), about the same centre. Boxes and planes find them where they were.
+    /// The same body with its nodes elsewhere (m), about the same centre. Boxes, planes and walls find them where they were.
     pub(crate) fn moved_to(&self, points: &[[f64; 3]]) -> Self {
         let mut moved = self.clone();
         moved.local = points.iter().map(|&point| self.local_point(point)).collect();
@@ -51,7 +51,7 @@ impl Body {
         moved
     }
 
-    /// Where boxes and planes find the nodes, m.
+    /// Where boxes, planes and walls find the nodes, m.
     pub(crate) fn places(&self) -> &[[f64; 3]] {
         self.found_at.as_ref().unwrap_or(&self.mesh.points)
     }

@@ -20,6 +20,13 @@ pub(crate) struct DirectionsTable {
     helix: Option<Spanned<[f64; 2]>>,
 }
 
+impl DirectionsTable {
+    /// Whether they follow from where the surface is.
+    pub(crate) const fn are_of_a_wall(&self) -> bool {
+        self.axis.is_some()
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Direction {
@@ -45,7 +52,7 @@ pub(super) fn read(file: &SceneFile, at: &Spanned<DirectionsTable>, body: &Body)
         }
         (None, None, Some(axis), Some(through), Some(helix)) => {
             let wall = Wall { axis: *axis.get_ref(), through: *through.get_ref(), helix: *helix.get_ref() };
-            wall.directions(&body.mesh.points, &body.mesh.tets).map_err(|error| file.problem(axis, error))
+            wall.directions(body.places(), &body.mesh.tets).map_err(|error| file.problem(axis, error))
         }
         _ => Err(file.problem(at, FORMS)),
     }

@@ -87,6 +87,11 @@ impl Tissues {
         self.of_element.iter().enumerate().filter(move |(_, of)| **of == tissue).map(|(element, _)| element)
     }
 
+    /// The directions of fibres in each element; empty if there are none.
+    pub(crate) fn directions(&self) -> &[Directions] {
+        &self.directions
+    }
+
     /// The tissue, if there is only one.
     pub fn only(&self) -> Option<Tissue<AnyLaw>> {
         if let [only] = *self.tissues { Some(only) } else { None }
@@ -157,6 +162,15 @@ impl fmt::Display for Tissues {
             more => write!(f, ", {more} further regions"),
         }
     }
+}
+
+/// The elements of a `[[region]]`, those of later ones among them.
+pub(crate) fn elements_of_region(
+    file: &SceneFile,
+    at: &Spanned<TissueTable>,
+    body: &Body,
+) -> Result<Vec<usize>, Problem> {
+    Table { file, at }.elements(body)
 }
 
 fn read_law(file: &SceneFile, at: &Spanned<String>) -> Result<AnyLaw, Problem> {

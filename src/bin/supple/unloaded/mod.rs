@@ -8,6 +8,7 @@
 //! nearly as far from the unloaded one as under the loads, in the other direction (Govindjee and Mihalic, Computer Methods
 //! in Applied Mechanics and Engineering 136, 1996, have why it is not the answer itself).
 
+mod carried;
 mod mixture;
 
 use std::path::PathBuf;
@@ -62,7 +63,7 @@ pub(crate) fn unloaded(asked: &Asked) -> Result<End, Problem> {
         return Err(Problem(format!("--out {}: the mesh is written as .vtu; name it so", asked.out.display())));
     }
     let file = SceneFile::read(&asked.scene)?;
-    let setup = Setup::read(&file)?;
+    let mut setup = Setup::read(&file)?;
     for warning in &setup.warnings {
         message!("warning: {warning}");
     }
@@ -72,10 +73,14 @@ pub(crate) fn unloaded(asked: &Asked) -> Result<End, Problem> {
             "supports that move have no shape without loads; remove [[move]], or make them [[fix]]",
         ));
     }
-    let mesh = setup.body.mesh.clone();
-    let found = Search { file: &file, image: setup, gap: 1e-3 * asked.gap, simulations: 0 }.run()?;
-    write(asked, &file, &mesh, &found)?;
-    let sag = distances(&found.points, &mesh.points);
+    let found = Search { file: &file, image: &mut setup, gap: 1e-3 * asked.gap, simulations: 0 }.run()?;
+    let (mesh, remedies) = carried::mesh_without_loads(&file, &setup, &found.points)?;
+    let image = &setup.body.mesh.points;
+    write(asked, &file, &mesh, image)?;
+    for remedy in remedies {
+        message!("warning: {remedy}");
+    }
+    let sag = distances(&found.points, image);
     row("sag, mean and most", format!("{:.2} and {:.2} mm", 1e3 * mean(&sag), 1e3 * most(&sag)));
     row("gap, mean and most", format!("{:.3} and {:.3} mm", 1e3 * found.mean_gap, 1e3 * found.largest_gap));
     row("simulations", found.simulations);
@@ -84,20 +89,20 @@ pub(crate) fn unloaded(asked: &Asked) -> Result<End, Problem> {
 }
 
 /// The mesh as `.vtu`, with the displacement to the image at its nodes, and the regions and vectors of its elements.
-fn write(asked: &Asked, file: &SceneFile, image: &TetMesh, found: &Found) -> Result<(), Problem> {
+fn write(asked: &Asked, file: &SceneFile, mesh: &TetMesh, image: &[[f64; 3]]) -> Result<(), Problem> {
     let scale = file.scene.mesh.get_ref().scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
-    let points: Vec<_> = found.points.iter().map(|point| point.map(|metre| metre / scale)).collect();
-    let to_image = found.points.iter().zip(&image.points);
+    let points: Vec<_> = mesh.points.iter().map(|point| point.map(|metre| metre / scale)).collect();
+    let to_image = mesh.points.iter().zip(image);
     let to_image: Vec<_> =
         to_image.map(|(from, to)| [0, 1, 2].map(|axis| ((to[axis] - from[axis]) / scale) as f32)).collect();
-    let vectors: Vec<Vec<[f32; 3]>> = image.vectors.iter().map(|vectors| single(&vectors.values)).collect();
-    let vectors: Vec<_> = image.vectors.iter().zip(&vectors).map(|(of, values)| (&of.name[..], &values[..])).collect();
+    let vectors: Vec<Vec<[f32; 3]>> = mesh.vectors.iter().map(|vectors| single(&vectors.values)).collect();
+    let vectors: Vec<_> = mesh.vectors.iter().zip(&vectors).map(|(of, values)| (&of.name[..], &values[..])).collect();
     let frame = Frame {
         points: &points,
-        tets: &image.tets,
+        tets: &mesh.tets,
         point_vectors: &[("to_image", &to_image)],
         cell_vectors: &vectors,
-        regions: &image.regions,
+        regions: &mesh.regions,
         ..Frame::default()
     };
     supple::io::write_vtu(&asked.out, &frame)
@@ -111,7 +116,7 @@ fn single(vectors: &[[f64; 3]]) -> Vec<[f32; 3]> {
 struct Search<'a> {
     file: &'a SceneFile,
     /// The scene of the image.
-    image: Setup,
+    image: &'a mut Setup,
     /// m.
     gap: f64,
     simulations: u32,
@@ -173,7 +178,7 @@ impl Search<'_> {
         if self.is_inside_out(points) {
             return Ok(None);
         }
-        // Areas, springs, pulls and directions are those of the mesh that is tried, as in a run of it.
+        // Areas, springs and pulls are those of the mesh that is tried, as in a run of it.
         let setup = Setup::with_body(self.file, self.image.body.moved_to(points))?;
         self.simulations += 1;
         // The image is where it should come to rest.
@@ -214,9 +219,9 @@ impl Search<'_> {
                 pressure.pascal = -pressure.pascal;
             }
         };
-        turn(&mut self.image);
-        let shape = at_rest(&self.image, None, REST * self.gap);
-        turn(&mut self.image);
+        turn(self.image);
+        let shape = at_rest(self.image, None, REST * self.gap);
+        turn(self.image);
         match shape {
             Ok(shape) => Ok(shape),
             // Then from the image on.
