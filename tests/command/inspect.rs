@@ -46,3 +46,43 @@ fn a_scene_tells_its_limits_memory_and_cost() {
         assert!(said.out.contains(part), "{part}: {}", said.out);
     }
 }
+
+const HELD: &str = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n";
+
+/// What `inspect --accuracy 0.2` says of a bar, and how far its pilots moved, mm.
+fn piloted(rest: &str) -> (String, Option<f64>) {
+    let desk = Desk::new();
+    desk.write("scene.toml", &bar(rest));
+    let said = desk.supple(&["inspect", "scene.toml", "--accuracy", "0.2"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (_, told) = said.out.split_once("expected error").unwrap();
+    println!("{rest}{told}");
+    let moved = told.split_once("that moved ").map(|(_, moved)| moved.split_once(" mm").unwrap().0.parse().unwrap());
+    (told.to_owned(), moved)
+}
+
+#[test]
+fn pilots_have_all_that_acts_on_the_scene() {
+    let time = "[time]\nend = 0.5\n";
+    let pull = "[[pull]]\npoint = [0.01, 0.01, 0.045]\nradius = 0.012\nstiffness = 50.0\n\
+                path = [[0.3, 0.01, 0.01, 0.045], [0.35, 0.025, 0.01, 0.045]]\n";
+    let ball = "[[instrument]]\nshape = \"sphere\"\nradius = 0.01\npath = [[0.0, -0.0105, 0.01, 0.045], [0.1, -0.004, 0.01, 0.045]]\n";
+    for (acts, expected) in [(pull, 1.0..10.0), (ball, 0.5..10.0)] {
+        let (told, moved) = piloted(&format!("{HELD}{acts}{time}"));
+        assert!(expected.contains(&moved.unwrap()) && !told.contains("\"50x\""), "{told}");
+    }
+    // On springs it hangs, in place of falling.
+    let springs = "[[spring]]\nplane = { axis = \"z\", at = 0.0 }\nstiffness = 1e3\ngravity = [2.0, 0.0, 0.0]\n";
+    let (_, moved) = piloted(&format!("{springs}{time}"));
+    assert!((1.0..60.0).contains(&moved.unwrap()), "{moved:?}");
+}
+
+#[test]
+fn of_a_scene_that_does_not_move_no_step_is_recommended() {
+    let gravity = "gravity = [2.0, 0.0, 0.0]\n";
+    for rest in [format!("{HELD}[time]\nend = 0.5\n"), format!("{HELD}{gravity}[time]\nend = 0.5\nsettle = 1e-6\n")] {
+        let (told, moved) = piloted(&rest);
+        assert!(told.contains("not foretold: the scene does not move") && moved.is_none(), "{told}");
+        assert!(told.contains("none: the scene does not move in its first 0.200 s"), "{told}");
+    }
+}

@@ -11,8 +11,9 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
 use supple::tled;
 
+use super::doubling::Pilots;
+use super::learned_cost;
 use super::times::{Times, Walker};
-use super::{doubling, learned_cost};
 use crate::added_mass::describe_added;
 use crate::problem::Problem;
 use crate::run::start::{first_step, grid};
@@ -23,7 +24,7 @@ use crate::screen::{output, row};
 const TIMED: u32 = 300;
 
 /// Critical step, memory and cost of a scene; `accuracy` is the error that a recommended step may have, mm.
-pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Problem> {
+pub(crate) fn describe(setup: &Setup, mut pilots: Pilots, accuracy: Option<f64>) -> Result<(), Problem> {
     let (scene, mut state) = setup.build()?;
     let scene = scene.view();
     row("material", &setup.tissues);
@@ -52,7 +53,7 @@ pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Probl
     let times = match &long {
         Some(method) => {
             let times = describe_beyond(method, setup, scene, &loads, bound)?;
-            doubling::predict_errors(method, setup, scene, &loads, bound)?;
+            pilots.predict_errors(method, bound)?;
             Some(times)
         }
         None => {
@@ -68,9 +69,7 @@ pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Probl
         row("real-time factor", real_time(step.seconds(), times.long));
     }
     match (accuracy, &long, &times) {
-        (Some(accuracy), Some(method), Some(times)) => {
-            doubling::recommend(method, setup, scene, &loads, bound, accuracy, times)
-        }
+        (Some(accuracy), Some(method), Some(times)) => pilots.recommend(method, bound, accuracy, times),
         _ => Ok(()),
     }
 }

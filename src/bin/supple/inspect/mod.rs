@@ -11,6 +11,7 @@ use std::path::Path;
 
 use supple::mesh::Winding;
 
+use self::doubling::Pilots;
 use crate::problem::Problem;
 use crate::scene::body::Body;
 use crate::scene::file::SceneFile;
@@ -27,12 +28,14 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         return Err(Problem(format!("--accuracy is {accuracy} mm, it must be a positive number")));
     }
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-        let setup = Setup::read(&SceneFile::read(path)?)?;
+        let file = SceneFile::read(path)?;
+        let setup = Setup::read(&file)?;
         mesh::describe(&setup.body)?;
         for warning in &setup.warnings {
             output!("warning: {warning}");
         }
-        return cost::describe(&setup, accuracy);
+        let pilots = Pilots::new(Setup::with_body(&file, setup.body.clone())?);
+        return cost::describe(&setup, pilots, accuracy);
     }
     let is_weights = is_weights(path);
     if accuracy.is_some() {
