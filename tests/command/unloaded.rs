@@ -75,6 +75,16 @@ fn loads_on_areas_are_those_of_the_unloaded_mesh() {
 }
 
 #[test]
+fn a_pressure_acts_in_full_whatever_its_ramp() {
+    let of_ramp = |ramp: &str| {
+        let load = format!("[[pressure]]\n{}\npascal = 60.0\nramp = {ramp}\n[time]", nodes_of_the_side());
+        let said = unloaded(&Desk::new(), &scene(BAR, 3000.0).replace("[time]", &load));
+        said.out.lines().next().map(str::to_owned)
+    };
+    assert_eq!(of_ramp("30.0"), of_ramp("0.0"));
+}
+
+#[test]
 fn the_mesh_keeps_the_tags_and_the_fibres_of_the_image() {
     let desk = Desk::new();
     // Stiff at the lower half.
