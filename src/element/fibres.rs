@@ -408,7 +408,7 @@ struct BoundsOf<'a, R> {
     fibres: Fibrous<'a>,
     tile: &'a FibreTile,
     first: usize,
-    /// In the lanes.
+    /// Of the vector.
     elements: &'a [usize; TILE],
     deformation: &'a Deformation<R>,
 }

@@ -249,3 +249,28 @@ fn a_command_that_is_the_laboratorys_now_says_what_to_type() {
         assert!(said.err.ends_with(&format!("{package}{rest}\n")), "{}", said.err);
     }
 }
+
+/// Two tetrahedra that meet in a face, each with nodes of its own; one is held.
+#[test]
+fn a_part_of_the_mesh_that_nothing_holds_is_remarked_upon() {
+    let points = "0 0 0 0.01 0 0 0 0.01 0 0 0 0.01 0.01 0 0 0 0.01 0 0 0 0.01 0.01 0.01 0.01";
+    let mesh = format!(
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n{points}\n\
+         CELLS 2 10\n4 0 1 2 3\n4 4 5 6 7\nCELL_TYPES 2\n10\n10\n"
+    );
+    for (held, warns) in [("[0, 1, 2]", true), ("[0, 1, 2, 4, 5, 6]", false)] {
+        let desk = Desk::new();
+        desk.write("two.vtk", &mesh);
+        let said = desk.simulate(
+            &format!(
+                "[mesh]\nfile = \"two.vtk\"\nwinding = \"normalise\"\n[material]\nlaw = \"neo-hookean\"\nc = 1000.0\n\
+                 d = 10000.0\ndensity = 1000.0\n[[fix]]\nnodes = {held}\n[time]\nend = 0.001\n"
+            ),
+            &[],
+        );
+        println!("{}", said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let words = "the mesh has 2 parts that share no node, and nothing holds 1 of them, of up to 4 nodes";
+        assert_eq!(said.err.contains(words), warns, "{}", said.err);
+    }
+}

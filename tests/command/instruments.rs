@@ -67,6 +67,7 @@ fn instruments_that_cannot_be_are_refused_with_their_line() {
         (sphere.replace("path = [[0.0, 0.0, 0.0, 0.1]]\n", ""), "line 11: an instrument needs a path"),
         (format!("{sphere}friction = -1.0\n"), "line 15: friction is -1, it must be zero or more"),
         (format!("{sphere}direction = [0.0, 0.0, 0.0]\n"), "line 15: direction is [0.0, 0.0, 0.0]; it needs a length"),
+        (sphere.replace("0.0, 0.0, 0.1]]", "0.01, 0.01, 0.02]]"), "line 11: this instrument starts inside the body"),
         (format!("{sphere}length = 0.1\n"), "line 15: a sphere has no use for that size"),
         ("shape = \"field\"\n".into(), "line 11: a field needs the file of a mesh"),
         ("shape = \"field\"\nfile = \"none.msh\"\n".into(), "line 13: none.msh"),
@@ -84,5 +85,23 @@ fn instruments_that_cannot_be_are_refused_with_their_line() {
         print!("{}", said.err);
         assert_eq!(said.code, 2);
         assert!(said.err.contains(sentence), "{}: {sentence}", said.err);
+    }
+}
+
+/// A ball that comes and goes within one step.
+#[test]
+fn steps_that_may_pass_over_a_part_of_a_path_are_warned_of() {
+    let desk = Desk::new();
+    let ball = "[[instrument]]\nshape = \"sphere\"\nradius = 0.005\n\
+                path = [[0.01, 0.01, 0.03, 0.04], [0.012, 0.01, 0.024, 0.04], [0.014, 0.01, 0.03, 0.04]]\n";
+    for (time, warns) in [
+        ("method = \"long\"\nstep = 0.004\nlattice = [1, 1, 2]\n", true),
+        ("method = \"auto\"\nlattice = [1, 1, 2]\n", false),
+    ] {
+        let said = desk.simulate(&bar(&format!("{ball}[time]\nend = 0.02\n{time}")), &["--force"]);
+        println!("{}", said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let words = "are longer than the part of a path from 0.010 s on, and may pass over it";
+        assert_eq!(said.err.contains(words), warns, "{}", said.err);
     }
 }

@@ -36,6 +36,17 @@ fn a_bar_on_springs_is_drawn_to_a_target() {
     }
 }
 
+/// Millimetres in place of metres.
+#[test]
+fn a_pull_far_outside_the_mesh_is_remarked_upon() {
+    let desk = Desk::new();
+    let pull = "[[pull]]\npoint = [10.0, 10.0, 50.0]\nstiffness = 1.0\n";
+    let said = desk.simulate(&bar(&format!("{pull}[time]\nend = 0.01\n")), &[]);
+    println!("{}", said.err);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("mm outside the mesh: the nearest element is pulled"), "{}", said.err);
+}
+
 #[test]
 fn points_follow_the_tissue() {
     let desk = Desk::new();
@@ -67,6 +78,7 @@ fn pulls_that_cannot_be_are_refused_with_their_line() {
         (format!("{pull}radius = 0.0\n"), "radius is 0, it must be positive"),
         (format!("{pull}most = -1.0\n"), "most is -1 N, it must be positive, inf for no limit"),
         (format!("{pull}path = []\n"), "the path has no point"),
+        (format!("{pull}along = [0.0, 0.0, 0.0]\n"), "along is [0.0, 0.0, 0.0]; it needs a length"),
         (format!("{pull}along = [nan, 0.0, 0.0]\n"), "a component of its direction is NaN"),
         (format!("{pull}radius = 0.001\n").replace("0.05]", "0.2]"), "the nearest node is 150.000 mm away"),
         (format!("{pull}length = 1.0\n"), "unknown field `length`"),

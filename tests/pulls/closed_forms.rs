@@ -213,7 +213,9 @@ fn the_usual_limit_is_that_of_the_tissue_at_the_pull() {
     let alone = limit(false, [&stiff, &stiff]);
     let [below, above, reversed] =
         [limit(false, [&soft, &stiff]), limit(false, [&stiff, &soft]), limit(true, [&stiff, &soft])];
-    println!("{alone} N in stiff tissue, {above} and {reversed} in soft tissue beside it, {below} beside soft tissue");
+    println!(
+        "{alone} N in stiff tissue, {above} and {reversed} in soft tissue next to it, {below} next to soft tissue"
+    );
     assert!(
         (below / alone - 1.0).abs() < 1e-4
             && (10.0 * above / alone - 1.0).abs() < 1e-4

@@ -109,7 +109,7 @@ impl<'a> Resting<'a> {
     fn new(setup: &'a Setup, from: Option<&[[f32; 3]]>) -> Result<Self, Unrest> {
         if !setup.instruments.is_empty() {
             return Err(Unrest::Problem(Problem(format!(
-                "{}: a state at rest with instruments cannot be found; remove [[instrument]], or measure over time",
+                "{}: a state at rest with instruments cannot be found; remove [[instrument]]",
                 setup.body.name
             ))));
         }

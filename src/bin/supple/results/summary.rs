@@ -130,7 +130,7 @@ fn add_steps(summary: &mut Summary, setup: &Setup, outcome: &Outcome, figures: &
     summary.add(
         "step",
         format!(
-            "{range}{longest:.3e} s; stable at rest {:.3e} s, least on the way {:.3e} s",
+            "{range}{longest:.3e} s; stable at rest {:.3e} s, least at a frame {:.3e} s",
             outcome.at_rest.seconds, least.seconds
         ),
         json!({
@@ -195,7 +195,7 @@ fn add_motion(summary: &mut Summary, outcome: &Outcome, figures: &Figures) {
     let largest = outcome.frames.iter().map(|frame| frame.largest).fold(figures.max_displacement, f64::max);
     summary.add(
         "maximum displacement",
-        format!("{mm:.3} mm at node {node} at the end, {:.3} mm on the way", 1e3 * largest),
+        format!("{mm:.3} mm at node {node} at the end, {:.3} mm at a frame", 1e3 * largest),
         json!({ "max_displacement_mm": mm, "max_displacement_node": node, "max_displacement_on_the_way_mm": 1e3 * largest }),
     );
     let energy = &figures.energy;

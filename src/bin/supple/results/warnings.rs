@@ -15,10 +15,23 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
         warnings.push("the frames have no von Mises stress: it is not known of tissue that relaxes".into());
     }
     if let Some(settled) = outcome.settled.filter(|settled| !settled.at_rest) {
-        warnings.push(format!(
-            "the body is not at rest after {} steps, {:.2e} m to go; a body that no support holds never is",
-            settled.steps, settled.remaining
-        ));
+        let to_go = match settled.remaining {
+            metre if metre.is_finite() => format!(", {metre:.2e} m to go; a body that no support holds never is"),
+            _ => String::new(),
+        };
+        warnings.push(format!("the body is not at rest after {} steps{to_go}", settled.steps));
+    }
+    // Of steps of one length; others end where a path turns.
+    if !setup.time.is_adaptive && !setup.time.sets_own_pace() {
+        let (_, longest) = outcome.steps;
+        let seconds = f64::from(longest);
+        let short = setup.instruments.short_part(seconds).or_else(|| setup.pulls.short_part(seconds));
+        if let Some(time) = short {
+            warnings.push(format!(
+                "steps of {longest:.3e} s are longer than the part of a path from {time:.3} s on, and may pass over it; \
+                 shorten them or write method = \"auto\""
+            ));
+        }
     }
     if let Some(time) = outcome.above_from {
         warnings.push(format!(

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use supple::contact::{
     Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode, passes_between,
 };
+use supple::points::VecPoints;
 use toml::Spanned;
 
 use super::body::Body;
@@ -96,7 +97,19 @@ impl SceneInstruments {
         if file.scene.learned.is_some() {
             return Err(file.problem(first, "learned steps cannot meet instruments; method = \"long\" can"));
         }
-        let all = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
+        let all: Vec<_> = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
+        let inside: Vec<_> = all.iter().flat_map(MovedInstrument::axis).collect();
+        if !inside.is_empty() {
+            let located = VecPoints::locate(&body.checked()?, &inside).map_err(Problem::of)?;
+            let mut points = located.points();
+            for (at, instrument) in tables.iter().zip(&all) {
+                let own = points.split_off(..instrument.axis().len()).unwrap_or_default();
+                if own.iter().any(|point| point.distance == 0.0) {
+                    let message = "this instrument starts inside the body; let its path begin outside";
+                    return Err(file.problem(at, message));
+                }
+            }
+        }
         Ok(Self::new(all, body))
     }
 
@@ -119,6 +132,11 @@ impl SceneInstruments {
     pub(crate) fn next_turn(&self, time: f64) -> f64 {
         let turns = self.all.iter().flat_map(|instrument| &instrument.path).map(|(turn, _)| *turn);
         turns.filter(|turn| *turn > time).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The first of two times (s) between which an instrument goes on a part of its path in less than so many seconds.
+    pub(crate) fn short_part(&self, seconds: f64) -> Option<f64> {
+        self.all.iter().find_map(|instrument| short_part(&instrument.path, seconds))
     }
 
     /// The surface with these instruments.
@@ -148,6 +166,21 @@ impl MovedInstrument {
         let surface = Surface::new(&[], 0).map_err(Problem::of)?;
         Contact::new(surface, &instruments).map_err(|error| file.problem(at, error))?;
         Ok(instrument)
+    }
+
+    /// Points of its axis where it starts, m from the centre of the body; none of a plane and of a field, which may start
+    /// inside another way.
+    fn axis(&self) -> Vec<[f32; 3]> {
+        let half = match self.shape {
+            OwnedShape::Sphere { .. } => 0.0,
+            OwnedShape::Capsule { length, .. } => 0.5 * length,
+            OwnedShape::Plane | OwnedShape::Field(_) => return vec![],
+        };
+        let (start, along) = (self.path[0].1, self.direction);
+        let length = along.iter().map(|component| component * component).sum::<f32>().sqrt();
+        let places: &[f32] = if half > 0.0 { &[-1.0, -0.5, 0.0, 0.5, 1.0] } else { &[0.0] };
+        let at = |place: &f32| [0, 1, 2].map(|axis| start[axis] + half * place / length * along[axis]);
+        places.iter().map(at).collect()
     }
 
     fn pose(&self, position: [f32; 3]) -> Pose {
@@ -276,6 +309,11 @@ fn read_path(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Re
         };
     };
     checked_path(file, path, body)
+}
+
+/// When the first part of a path begins that takes less than so many seconds, s.
+pub(super) fn short_part(path: &[(f64, [f32; 3])], seconds: f64) -> Option<f64> {
+    path.windows(2).find(|part| part[1].0 - part[0].0 < seconds).map(|part| part[0].0)
 }
 
 /// Times (s) that increase, and points (m from the centre of the body).

@@ -49,3 +49,46 @@ pub(crate) fn warnings(
     let of_others = of_others.map(|remark| Problem::in_file(file.path(), remark));
     of_mesh.chain(of_tissues).chain(of_others).chain(of_motions).map(|problem| problem.to_string()).collect()
 }
+
+/// A part of the mesh that shares no node with the others and that nothing holds, next to one that is held: meshes that were
+/// put together and whose nodes were not merged.
+pub(crate) fn loose_part(file: &SceneFile, body: &Body, held: impl Iterator<Item = u32>) -> Option<String> {
+    // Each node's way to the least node of its part.
+    let mut towards: Vec<u32> = (0..body.local.len() as u32).collect();
+    let root = |towards: &mut Vec<u32>, mut node: u32| {
+        while towards[node as usize] != node {
+            towards[node as usize] = towards[towards[node as usize] as usize];
+            node = towards[node as usize];
+        }
+        node
+    };
+    for &[first, ref others @ ..] in &body.mesh.tets {
+        for &other in others {
+            let [a, b] = [first, other].map(|node| root(&mut towards, node));
+            towards[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut holds = vec![false; towards.len()];
+    for node in held {
+        holds[root(&mut towards, node) as usize] = true;
+    }
+    let mut nodes = vec![0_usize; towards.len()];
+    for &node in body.mesh.tets.as_flattened() {
+        // Others belong to no element.
+        nodes[node as usize] = 1;
+    }
+    let mut of_part = vec![0_usize; towards.len()];
+    for node in (0..towards.len() as u32).filter(|&node| nodes[node as usize] > 0) {
+        of_part[root(&mut towards, node) as usize] += 1;
+    }
+    let parts = || of_part.iter().zip(&holds).filter(|(count, _)| **count > 0);
+    let (all, loose) = (parts().count(), parts().filter(|(_, holds)| !**holds).count());
+    let largest = parts().filter(|(_, holds)| !**holds).map(|(count, _)| *count).max()?;
+    (loose < all).then(|| {
+        let message = format!(
+            "the mesh has {all} parts that share no node, and nothing holds {loose} of them, of up to {largest} nodes; merge \
+             nodes that lie on each other, if they belong together"
+        );
+        file.problem(&file.scene.mesh, message).to_string()
+    })
+}

@@ -11,7 +11,7 @@ use toml::Spanned;
 
 use super::body::Body;
 use super::file::SceneFile;
-use super::instruments::{checked_path, positive};
+use super::instruments::{checked_path, positive, short_part};
 use super::select::select;
 use crate::problem::Problem;
 
@@ -40,6 +40,8 @@ struct MovedPull {
     along: [f32; 3],
     /// Of its target, s and m from the centre of the body.
     path: Vec<(f64, [f32; 3])>,
+    /// How far its point is outside the mesh, m.
+    outside: f32,
 }
 
 /// The pulls of a scene, and after them its springs, a node each.
@@ -75,7 +77,13 @@ impl ScenePulls {
     fn add(&mut self, file: &SceneFile, at: &Spanned<PullTable>, body: &Body, volumes: &[f32]) -> Result<(), Problem> {
         let table = at.get_ref();
         let point = body.local_point(*table.point.get_ref());
-        let first = self.nodes.len();
+        if let Some(along) = table.along.as_ref().filter(|along| *along.get_ref() == [0.0; 3]) {
+            return Err(file.problem(
+                along,
+                "along is [0.0, 0.0, 0.0]; it needs a length, or leave it out to pull along all axes",
+            ));
+        }
+        let (first, mut outside) = (self.nodes.len(), 0.0);
         match positive(file, "radius", table.radius.as_ref(), f32::MIN_POSITIVE)? {
             Some(radius) => {
                 self.nodes.resize(first + body.local.len(), PulledNode::default());
@@ -86,6 +94,7 @@ impl ScenePulls {
             None => {
                 let located = VecPoints::locate(&body.checked()?, &[point]);
                 let located = located.map_err(|error| file.problem(&table.point, error))?;
+                outside = located.points()[0].distance;
                 self.nodes.extend(located.points().iter().flat_map(corners));
             }
         }
@@ -107,6 +116,7 @@ impl ScenePulls {
             most,
             along: table.along.as_ref().map_or([0.0; 3], |along| *along.get_ref()),
             path,
+            outside,
         };
         // Whatever else the kernel refuses.
         Pulls::new(body.local.len(), &self.nodes, &[pull.at(0.0)]).map_err(|error| file.problem(at, error))?;
@@ -114,8 +124,10 @@ impl ScenePulls {
         Ok(())
     }
 
-    /// Pulls that move nothing, with the place of their entry.
+    /// Pulls that move nothing or are outside the mesh, with the place of their entry.
     pub(crate) fn warnings(&self, file: &SceneFile, supports: &[Support]) -> Vec<String> {
+        /// m; a point on the surface may be outside by rounding.
+        const LEAST: f32 = 5e-6;
         let held = |node: u32| {
             let own = supports.iter().filter(|support| support.node == node);
             own.fold(Axes::NONE, |axes, support| axes.union(support.axes))
@@ -126,7 +138,15 @@ impl ScenePulls {
             let remark = of_pull(nodes.map(|pulled| held(pulled.node)), pull.along)?;
             Some(file.problem(at, remark).to_string())
         };
-        file.scene.pull.iter().zip(&self.all).filter_map(remark).collect()
+        let mut remarks: Vec<_> = file.scene.pull.iter().zip(&self.all).filter_map(remark).collect();
+        for (at, pull) in file.scene.pull.iter().zip(&self.all).filter(|(_, pull)| pull.outside > LEAST) {
+            let message = format!(
+                "point is {:.2} mm outside the mesh: the nearest element is pulled; places are in metres",
+                1e3 * pull.outside
+            );
+            remarks.push(file.problem(&at.get_ref().point, message).to_string());
+        }
+        remarks
     }
 
     /// A node each that is drawn to where it is at rest.
@@ -159,9 +179,14 @@ impl ScenePulls {
             self.nodes.push(PulledNode { node, weight: 1.0 });
             let (nodes, most, along) = ([first, 1], Some(f32::INFINITY), [0.0; 3]);
             let stiffness = stiffness.min(MOST_STIFFNESS);
-            self.all.push(MovedPull { nodes, at, stiffness, most, along, path: vec![(0.0, at)] });
+            self.all.push(MovedPull { nodes, at, stiffness, most, along, path: vec![(0.0, at)], outside: 0.0 });
         }
         Ok(())
+    }
+
+    /// The nodes of all pulls and springs.
+    pub(crate) fn pulled_nodes(&self) -> impl Iterator<Item = u32> {
+        self.nodes.iter().map(|pulled| pulled.node)
     }
 
     pub(crate) const fn len(&self) -> usize {
@@ -186,6 +211,11 @@ impl ScenePulls {
     pub(crate) fn next_turn(&self, time: f64) -> f64 {
         let turns = self.all.iter().flat_map(|pull| &pull.path).map(|(turn, _)| *turn);
         turns.filter(|turn| *turn > time).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The first of two times (s) between which a target goes on a part of its path in less than so many seconds.
+    pub(crate) fn short_part(&self, seconds: f64) -> Option<f64> {
+        self.all.iter().find_map(|pull| short_part(&pull.path, seconds))
     }
 
     /// These pulls with their nodes, on a body of so many nodes.

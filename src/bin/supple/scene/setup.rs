@@ -76,6 +76,8 @@ impl Setup {
         let points = ScenePoints::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
+        let held = supports.iter().map(|support| support.node).chain(pulls.pulled_nodes());
+        warnings.extend(plausible::loose_part(file, &body, held));
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
