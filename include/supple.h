@@ -2802,8 +2802,9 @@ supple_status supple_sim_describe(supple_sim *sim, supple_sim_objects *objects);
 
 /**
  * Moves on by `seconds`, usually a frame, under the loads and instruments, and ends there to a millionth of it; learned
- * steps end at the nearest of the network's. Motions without a ramp go evenly over the call. Where a step is refused
- * the status says why, and the state is that before it; the next call begins there and is no longer for it.
+ * steps end at the nearest of the network's. A span shorter than a sixteenth of the last step is left to the next call.
+ * Motions without a ramp go evenly over the call. Where a step is refused the status says why, and the state is that
+ * before it; the next call begins there and is no longer for it.
  *
  * @param threads NULL: the calling thread alone.
  * @param report may be NULL; is written whatever the status.

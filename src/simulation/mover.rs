@@ -104,6 +104,10 @@ struct Call<'c, L, T, W> {
     work: Work,
 }
 
+/// A span shorter than this share of the last step is left to the next call: what an instrument or a lattice does to nodes in
+/// one step, a step that is far shorter would turn into velocities.
+const SHORTEST: f64 = 1.0 / 16.0;
+
 impl Mover<'_, '_> {
     /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the
     /// report has the status; or until the work is spent, which the status says. `watch` is shown each step.
@@ -123,7 +127,7 @@ impl Mover<'_, '_> {
         let span = until - state.time();
         match self {
             // The last call may have ended here or beyond; a span that is no number is none either.
-            _ if span.is_nan() || span <= 0.0 => {}
+            _ if span.is_nan() || span <= SHORTEST * f64::from(state.last_step()) => {}
             Self::Exact(mut exact) => {
                 call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
             }

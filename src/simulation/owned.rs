@@ -208,8 +208,8 @@ impl<'w> Simulation<'w> {
         pulls.read(pull, self.state.displacements(), self.state.pull_forces(), self.state.time())
     }
 
-    /// Moves on by so many seconds, usually a frame, under its loads and instruments. Where a step is refused the error
-    /// says why, and the state is that before it.
+    /// Moves on by so many seconds, usually a frame, under its loads and instruments. A span shorter than a sixteenth of the
+    /// last step is left to the next call. Where a step is refused the error says why, and the state is that before it.
     pub fn advance(&mut self, seconds: f64) -> Result<Report, SimulationError> {
         self.advance_in_parts(seconds, &CallingThread)
     }

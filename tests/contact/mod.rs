@@ -8,6 +8,7 @@ mod grips;
 mod hand_speed;
 mod long_steps;
 mod scene;
+mod short_spans;
 mod surface_fields;
 mod thin;
 mod touching;

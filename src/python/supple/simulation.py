@@ -532,7 +532,8 @@ class Simulation:
 
     @_one_at_a_time
     def advance(self, seconds: float) -> Report:
-        """Moves on by so many seconds; learned steps end at the nearest of the network's. Raises `Diverged` where a step is refused: the
+        """Moves on by so many seconds; learned steps end at the nearest of the network's, and a span shorter than a sixteenth
+        of the last step is left to the next call. Raises `Diverged` where a step is refused: the
         state is then the last good one."""
         if not (np.isfinite(seconds) and seconds > 0.0):
             raise InputError(f"advance by {seconds} s: it must be a positive number")
