@@ -2163,6 +2163,19 @@ supple_status supple_set_targets(supple_pulls *pulls,
                                  supple_error *error);
 
 /**
+ * The same of `count` pulls from the one at `first` on; the targets of the others go on as they do.
+ *
+ * @param error may be NULL; index is that of a pull.
+ */
+supple_status supple_set_targets_from(supple_pulls *pulls,
+                                      uint32_t first,
+                                      const float *targets,
+                                      uint32_t count,
+                                      double from,
+                                      double to,
+                                      supple_error *error);
+
+/**
  * Turns the points of pulls with the body, as it is in a state: a host calls it between frames, and before it settles. The
  * nodes of a pull move its point by their mean. Near a surface, where they are all on one side of the point, its tissue
  * moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart. A

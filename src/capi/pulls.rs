@@ -321,22 +321,62 @@ pub unsafe extern "C" fn supple_set_targets(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
-        let (object, arrays) = memory::open(pulls)?;
-        if count != object.pulls {
-            return Err(mismatch(count as usize, object.pulls as usize));
+        let all = memory::open(pulls)?.0.pulls;
+        if count != all {
+            return Err(mismatch(count as usize, all as usize));
         }
-        let (targets, all) = (array(targets.cast::<[f32; 3]>(), count as usize)?, object.nodes as usize);
-        let pulls = object.parts(arrays).pulls;
-        for (index, (&pull, target)) in pulls.iter().zip(targets).enumerate() {
-            let mut moved = pull;
-            moved.move_to(*target, from, to);
-            checked(&moved, index, all)?;
-        }
-        pulls.iter_mut().zip(targets).for_each(|(pull, target)| pull.move_to(*target, from, to));
-        Ok(SUPPLE_OK)
+        set_targets(pulls, 0, targets, count, [from, to])
     };
     // SAFETY: as above.
     unsafe { memory::answered(set(), error) }
+}
+
+/// The same of `count` pulls from the one at `first` on; the targets of the others go on as they do.
+///
+/// @param error may be NULL; index is that of a pull.
+#[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments)]
+pub unsafe extern "C" fn supple_set_targets_from(
+    pulls: *mut supple_pulls,
+    first: u32,
+    targets: *const f32,
+    count: u32,
+    from: f64,
+    to: f64,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe { set_targets(pulls, first, targets, count, [from, to]) };
+    // SAFETY: as above.
+    unsafe { memory::answered(set(), error) }
+}
+
+/// Sets some targets, if all can be.
+///
+/// # Safety
+/// As at [`supple_set_targets_from`].
+unsafe fn set_targets(
+    pulls: *mut supple_pulls,
+    first: u32,
+    targets: *const f32,
+    count: u32,
+    [from, to]: [f64; 2],
+) -> Answer<supple_status> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (object, arrays) = memory::open(pulls)?;
+        let (targets, all) = (array(targets.cast::<[f32; 3]>(), count as usize)?, object.nodes as usize);
+        let (first, there) = (first as usize, object.pulls as usize);
+        let own = object.parts(arrays).pulls.get_mut(first..).and_then(|own| own.get_mut(..targets.len()));
+        let own = own.ok_or_else(|| mismatch(first.saturating_add(targets.len()), there))?;
+        for (index, (&pull, target)) in own.iter().zip(targets).enumerate() {
+            let mut moved = pull;
+            moved.move_to(*target, from, to);
+            checked(&moved, first + index, all)?;
+        }
+        own.iter_mut().zip(targets).for_each(|(pull, target)| pull.move_to(*target, from, to));
+        Ok(SUPPLE_OK)
+    }
 }
 
 /// Turns the points of pulls with the body, as it is in a state: a host calls it between frames, and before it settles. The

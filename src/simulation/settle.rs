@@ -13,7 +13,7 @@ impl Simulation<'_> {
     /// Brings the body to rest under its loads and instruments ([`tled::settle`]): every node to within about `metre` (m)
     /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
     /// time, which stands still, the points of pulls turned with the body as it is before ([`Simulation::turn_pulls`]), and
-    /// velocities are zero afterwards; steps of every method go on from there. Where a
+    /// velocities are zero afterwards; ablations are as far as they are due, and steps of every method go on from there. Where a
     /// step is refused the error says why, and the state is that before it.
     pub fn settle(&mut self, metre: f32, most_steps: u32) -> Result<Settled, SimulationError> {
         self.settle_in_parts(metre, most_steps, &CallingThread)
@@ -26,6 +26,7 @@ impl Simulation<'_> {
         most_steps: u32,
         threads: &impl Threads,
     ) -> Result<Settled, SimulationError> {
+        self.ablate_on()?;
         // What is refused turns nothing.
         self.acting()?;
         self.turn_pulls();
@@ -45,6 +46,7 @@ impl Simulation<'_> {
         most_steps: u32,
         mut loads: &mut dyn LoadsOverTime,
     ) -> Result<Settled, SimulationError> {
+        self.ablate_on()?;
         let (scene, state) = self.parts_mut();
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
         let (view, state) = (scene.view(), state.view());

@@ -1143,6 +1143,11 @@ static void pulls(void) {
     CHECK(error.index == 0);
     REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, 3e6f, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     DONE(supple_set_targets(made, targets[0], 2, 0.0, 0.01, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_targets_from(made, 1, targets[0], 2, 0.0, 0.01, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_targets_from(made, UINT32_MAX, targets[0], 1, 0.0, 0.01, &error));
+    REFUSED(SUPPLE_E_PULL, supple_set_targets_from(made, 1, (const float[3]){0, INFINITY, 0}, 1, 0.0, 0.01, &error));
+    CHECK(error.index == 1);
+    DONE(supple_set_targets_from(made, 1, targets[1], 1, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_pulls(small_loads, made));
     REFUSED(SUPPLE_E_KIND, supple_set_pulls(acts, (supple_pulls *)(void *)state));
     DONE(supple_set_pulls(acts, made));

@@ -19,6 +19,7 @@ ADVANCED = {
     "supple_copy_positions": "numpy adds points and displacements",
     "supple_state_carry_on": "Simulation.exchange lets the state go on",
     "supple_set_tissues": "Simulation.ablate changes those of the simulation",
+    "supple_set_targets": "each group of pulls has targets of its own, by supple_set_targets_from",
     "supple_set_pull": "Pulls.release ends pulls, Simulation.pull makes others",
     "supple_add_pull_of_nodes": "for springs and points of hosts with weights of their own; Simulation.pull takes patches",
     **dict.fromkeys(["supple_loads_size", "supple_loads_init", "supple_state_size", "supple_state_init"], BY_THE_SIMULATION),

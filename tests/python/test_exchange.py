@@ -68,10 +68,33 @@ def test_an_ablation_ends_where_a_body_is_that_was_so_from_the_start(soft):
     off, way = abs(simulation.displacements - always.displacements).max(), abs(always.displacements).max()
     print(f"{1e3 * off:.4f} of {1e3 * way:.2f} mm")
     assert off < 0.002 * way
-    # Again, and at once; and with some of it removed.
+    # Again, and at once: at rest it is that of the soft bar; and with some of it removed.
     simulation.ablate(region, soft, 0.0)
+    soft_bar = supple.Simulation(scene_of(mesh, soft), damping=30.0, gravity=(4.0, 0.0, 0.0))
+    assert simulation.settle(1e-5).at_rest and soft_bar.settle(1e-5).at_rest
+    assert always.settle(1e-5).at_rest
+    off, between = (abs(each.displacements - soft_bar.displacements).max() for each in (simulation, always))
+    print(f"at rest {1e3 * off:.3f} mm off the soft bar, the stiff one {1e3 * between:.3f} mm")
+    assert off < 0.1 * between
     simulation.remove(np.flatnonzero(centres(mesh)[:, 2] > 0.05))
     assert simulation.advance(0.1).ok and len(simulation.scene._tissues) == 3
+
+
+def test_fields_and_points_are_those_of_what_is_left(soft):
+    """A slab is cut out and the gap closes: living tissue lies where removed elements would be."""
+    mesh = supple.Mesh.box((0.02, 0.02, 0.08), (3, 3, 16))
+    heights = centres(mesh)[:, 2]
+    gone = (heights > 0.03) & (heights < 0.05) & (centres(mesh)[:, 0] > 0.006)
+    simulation = supple.Simulation(scene_of(mesh, soft), damping=30.0, gravity=(1.5, 0.0, 0.0))
+    simulation.remove(np.flatnonzero(gone))
+    simulation.advance(0.5)
+    shape = simulation.scene._mesh_of_tissue()
+    assert len(shape.tets) == (~gone).sum()
+    grid = supple.Grid((-5.0, -5.0, -2.0), (2.0, 2.0, 2.0), (30, 15, 45))
+    left = supple.displacement_field(shape, simulation.displacements, grid, "inverse", axes="LPS")
+    assert (simulation.field(grid, "inverse").values == left.values).all()
+    points = simulation.locate([[0.015, 0.01, 0.04], [0.01, 0.01, 0.01]])
+    assert points.distances[0] > 1e-3 and points.distances[1] == 0.0 and not gone[points.elements].any()
 
 
 def test_instruments_and_pulls_follow(soft):

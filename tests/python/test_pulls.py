@@ -84,6 +84,25 @@ def test_targets_move_and_pulls_end(soft):
     assert first.points[:, 1] == pytest.approx([0.0129] * 2, abs=5e-4)
 
 
+def test_each_group_of_pulls_goes_its_own_way(soft):
+    mesh, ends = bar(), np.array([[0.01, 0.01, 0.06], [0.01, 0.01, 0.0]], np.float32)
+    simulation = supple.Simulation(supple.Scene(mesh, soft), damping=20.0)
+    slow, quick = (simulation.pull([end], [end]) for end in ends)
+    aside = np.array([[0.012, 0.01, 0.06]], np.float32)
+    slow.move(aside, within=0.2)
+    for frame in range(10):
+        quick.move([[0.01, 0.01 + 1e-4 * frame, 0.0]], within=0.01)
+        if frame == 3:
+            # Made anew in the middle of the way of the first.
+            simulation.pull([[0.0, 0.0, 0.03]]).release()
+        simulation.advance(0.01)
+        target = slow.points[0] + slow.gaps[0]
+        assert target[0] == pytest.approx(0.01 + 1e-4 * (frame + 1), abs=2e-6), frame
+    simulation.reset()
+    simulation.advance(1e-3)
+    assert slow.points[0] + slow.gaps[0] == pytest.approx(aside[0], abs=1e-6)
+
+
 def test_what_cannot_be_is_refused(soft):
     simulation = supple.Simulation(supple.Scene(bar(), soft))
     at = [[0.01, 0.01, 0.03]]

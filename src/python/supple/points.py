@@ -46,7 +46,9 @@ class FollowedPoints:
 
     def __init__(self, simulation: Simulation, places: ArrayLike) -> None:
         # The simulation, too: its memory must stay.
-        self._simulation, self._points = simulation, _located(simulation.scene.mesh, places)
+        self._simulation, self._points = simulation, _located(simulation.scene._mesh_of_tissue(), places)
+        # Numbers of elements are those of the whole mesh.
+        self._points["element"] = np.flatnonzero(simulation.scene._removed == 0)[self._points["element"]]
         self._points.flags.writeable = False
         self.rest: NDArray[np.float32] = self._points["rest"]
         self.distances: NDArray[np.float32] = self._points["distance"]

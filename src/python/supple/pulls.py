@@ -29,6 +29,21 @@ class Wanted:
     stiffness: NDArray[np.float32]
     most: float
     along: NDArray[np.float32]
+    # Where targets are at the first of these times; they are at `targets` from the second on.
+    start: NDArray[np.float32] = dataclasses.field(default_factory=lambda: np.empty((0, 3), np.float32))
+    times: tuple[float, float] = (0.0, 0.0)
+
+    def at(self, time: float) -> NDArray[np.float32]:
+        """Where the targets are, m. One that was absent is there at once."""
+        begin, end = self.times
+        if time >= end or len(self.start) != len(self.targets):
+            return self.targets
+        share = np.float32(max(0.0, (time - begin) / (end - begin)))
+        between = self.start + share * (self.targets - self.start)
+        return np.where(np.isnan(between), self.targets, between)
+
+    def aim(self, targets: NDArray[np.float32], now: float, within: float) -> None:
+        self.start, self.targets, self.times = self.at(now), targets, (now, now + within)
 
     def row(self, index: int) -> Any:
         pull = ffi.new("supple_pull *")
@@ -63,11 +78,17 @@ class PullMemory:
         for group in groups:
             for index in range(len(group.points)):
                 library.checked(lib.supple_add_pull(self.raw, simulation._raw_scene, points, group.row(index), error), error, "pulls")
-        self.aim(np.concatenate([group.targets for group in groups]), (0.0, 0.0))
+        first, now = 0, simulation.time
+        for group in groups:
+            # On its way.
+            self.aim(first, group.at(now), (0.0, 0.0))
+            if group.times[1] > now:
+                self.aim(first, group.targets, (now, group.times[1]))
+            first += len(group.points)
 
-    def aim(self, targets: NDArray[np.float32], times: tuple[float, float]) -> None:
+    def aim(self, first: int, targets: NDArray[np.float32], times: tuple[float, float]) -> None:
         error, rows = library.new_error(), np.ascontiguousarray(targets)
-        status = lib.supple_set_targets(self.raw, library.pointer("float", rows), len(rows), *times, error)
+        status = lib.supple_set_targets_from(self.raw, first, library.pointer("float", rows), len(rows), *times, error)
         library.checked(status, error, "targets")
 
     def turn(self, simulation: Simulation) -> None:

@@ -194,6 +194,10 @@ class Scene:
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
 
+    def _mesh_of_tissue(self) -> Mesh:
+        """The mesh without what was removed; nodes keep their numbers."""
+        return self.mesh if not self._removed.any() else Mesh(self.mesh.points, self.mesh.tets[self._removed == 0])
+
     def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)

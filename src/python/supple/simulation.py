@@ -414,15 +414,13 @@ class Simulation:
 
     @_one_at_a_time
     def _aim(self, wanted: Wanted, targets: NDArray[np.float32], within: float) -> None:
-        self._place_of(wanted)
+        place = self._place_of(wanted)
         if not (np.isfinite(within) and within >= 0.0):
             raise InputError(f"within {within} s: it must be zero or more")
         assert self._pull_memory is not None
-        # A later move of one group goes on from where the targets of the others are.
-        all_targets = [targets if group is wanted else group.targets for group in self._pull_groups]
-        self._pull_memory.aim(np.concatenate(all_targets), (self.time, self.time + within))
+        self._pull_memory.aim(place.start, targets, (self.time, self.time + within))
         self._pull_memory.turn(self)
-        wanted.targets = targets
+        wanted.aim(targets, self.time, within)
 
     @_one_at_a_time
     def _pulled(self, wanted: Wanted) -> NDArray[np.void]:
@@ -581,13 +579,14 @@ class Simulation:
     @_one_at_a_time
     def settle(self, metre: float, *, most_steps: int = 10_000) -> Settled:
         """Brings the body to rest under its loads and instruments, as they act at the present time, which stands still: every node to within
-        about `metre` of where it rests. Velocities are zero afterwards. Each of the steps takes about as long as an exact one. Raises
+        about `metre` of where it rests, ablations as far as they are due. Velocities are zero afterwards. Each of the steps takes about as long as an exact one. Raises
         `Diverged` where a step is refused."""
         if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
             raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
         if not (np.isfinite(metre) and metre > 0.0):
             raise InputError(f"settle to within {metre} m: it must be a positive number")
         self._warn_once()
+        next_stage(self)
         room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
         if self._pull_memory:
             self._pull_memory.turn(self)
@@ -667,7 +666,7 @@ class Simulation:
         vectors = ffi.new("supple_vectors *")
         library.checked(lib.supple_displacements(self._state, vectors))
         largest = float(np.linalg.norm(self._vectors, axis=1).max())
-        return field_of(self.scene.mesh, vectors, largest, (image, kind, reach, axes))
+        return field_of(self.scene._mesh_of_tissue(), vectors, largest, (image, kind, reach, axes))
 
     @_one_at_a_time
     def save(self) -> bytes:
@@ -687,8 +686,11 @@ class Simulation:
 
     @_one_at_a_time
     def reset(self) -> None:
-        """Back to rest, at time zero."""
+        """Back to rest, at time zero; targets of pulls are where they were to go."""
         library.checked(lib.supple_state_reset(self._state))
+        for group in self._pull_groups:
+            group.times = (0.0, 0.0)
+        self._set_pulls(self._pull_groups)
         self._prepare_again()
 
     @_one_at_a_time
