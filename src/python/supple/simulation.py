@@ -242,7 +242,8 @@ class Simulation:
 
     @_one_at_a_time
     def set_forces(self, nodes: ArrayLike, newton: ArrayLike, ramp: float = 0.0) -> None:
-        """Replaces all forces: on each of these nodes a force (N), one for all or a row for each, which rises evenly over `ramp` s."""
+        """Replaces all forces: on each of these nodes a force (N), one for all or a row for each, which rises evenly over the first `ramp` s
+        of the simulation: set later, it acts in full."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "forces")
         rows = np.zeros(len(numbers), _FORCE)
         rows["node"], rows["newton"], rows["ramp"] = numbers, library.vectors(newton, "newton", len(numbers)), ramp
@@ -251,7 +252,7 @@ class Simulation:
     @_one_at_a_time
     def set_tractions(self, triangles: ArrayLike, pascal: ArrayLike, ramp: float = 0.0) -> None:
         """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, a force per area at rest
-        (Pa, one vector), which rises evenly over `ramp` s. Its direction stays while the body moves."""
+        (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves."""
         corners, points = np.asarray(triangles), self.scene.mesh.points
         if corners.size and (corners.ndim != 2 or corners.shape[1] != 3):
             raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
@@ -280,7 +281,7 @@ class Simulation:
     def add_pressure(self, triangles: ArrayLike, pascal: float, ramp: float = 0.0) -> Pressure:
         """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as of
         `Mesh.boundary`. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
-        `ramp` s. It is changed through what this gives."""
+        the first `ramp` s of the simulation. It is changed through what this gives."""
         corners, points = np.asarray(triangles), self.scene.mesh.points
         if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
             raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
@@ -311,8 +312,8 @@ class Simulation:
 
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
-        """Replaces all motions: moved nodes of the scene go to these displacements (m) along `axes`, evenly over `ramp` s, or over the next
-        call of `advance` without one."""
+        """Replaces all motions: moved nodes of the scene go to these displacements (m) along `axes`, evenly over the first `ramp` s of the
+        simulation, or over the next call of `advance` without one."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "motions")
         rows = np.zeros(len(numbers), _MOTION)
         rows["node"], rows["metre"], rows["ramp"] = numbers, library.vectors(metre, "metre", len(numbers)), ramp
