@@ -230,7 +230,8 @@ fn look_in_turn<M: ElementMaterial>(
 }
 
 /// Adds the forces of crushed elements to the nodes in `partitions`, from the marks of the state. Gives their least
-/// `J - 1`.
+/// `J - 1`. Not inlined: its stack is not that of the other kernels.
+#[inline(never)]
 fn crushed_forces<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
