@@ -16,7 +16,7 @@ use super::ElementTile;
 use super::deformation::{Deformation, LeftOut, Matrix, edges};
 use super::extension::{Extension, NoExtension};
 use super::pressure::{OwnPressure, Pressure};
-use super::stiffness_bound::{MaybeBound, scale_of};
+use super::stiffness_bound::scale_of;
 
 /// The elements of a scene with their laws.
 #[derive(Clone, Copy)]
@@ -136,13 +136,9 @@ impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
 
 impl<'a, L: Law + Into<AnyLaw>, V, P> InternalForces<'a, L, V, P> {
     /// The same with what the stress has besides that of the law.
-    pub(crate) fn with_extension<K>(
-        self,
-        extension: K,
-        visitor: MaybeBound,
-    ) -> InternalForces<'a, AnyLaw, MaybeBound, P, K> {
+    pub(crate) fn with_extension<K>(self, extension: K) -> InternalForces<'a, AnyLaw, V, P, K> {
         let Self { elements: Elements { laws, tiles, partitions: all }, pressure, partitions, .. } = self;
-        let Self { displacement, remainder, force, .. } = self;
+        let Self { displacement, remainder, force, visitor, .. } = self;
         let elements = Elements { laws: laws.any(), tiles, partitions: all };
         InternalForces { elements, pressure, partitions, displacement, remainder, force, visitor, extension }
     }

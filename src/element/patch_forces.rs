@@ -20,7 +20,7 @@ use super::extension::{Extension, NoExtension};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
 use super::patch_deformation::{GradientLengths, gradient};
-use super::stiffness_bound::{Coefficients, MaybeBound, scalar_bound_of_patches};
+use super::stiffness_bound::{Coefficients, scalar_bound_of_patches};
 use super::tile::vector_at;
 
 /// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and
@@ -42,8 +42,8 @@ pub struct PatchForces<'a, L, V, K = NoExtension> {
 
 impl<'a, L: Law + Into<AnyLaw>, V> PatchForces<'a, L, V> {
     /// The same with what the stress has besides that of the law.
-    pub(crate) fn with_extension<K>(self, extension: K, visitor: MaybeBound) -> PatchForces<'a, AnyLaw, MaybeBound, K> {
-        let Self { laws, patches, partitions, displacement, remainder, force, .. } = self;
+    pub(crate) fn with_extension<K>(self, extension: K) -> PatchForces<'a, AnyLaw, V, K> {
+        let Self { laws, patches, partitions, displacement, remainder, force, visitor, extension: NoExtension } = self;
         PatchForces { laws: laws.any(), patches, partitions, displacement, remainder, force, visitor, extension }
     }
 }

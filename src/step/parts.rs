@@ -275,50 +275,69 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     visitor: V,
     past: Option<PastOfPart<'_>>,
 ) -> Extremes<f32> {
-    let elements = scene.elements();
     // Seen by the compiler, which then leaves these kernels out where no tissue can relax or has fibres.
     let (fibres, past) = (scene.fibrous(), past.filter(|_| scene.vectors_of_tile() > 0));
-    let (is_extended, bounds) = (fibres.is_some() || past.is_some(), MaybeBound(visitor.bounds()));
-    if scene.element().is_nodal_strain() {
-        let (laws, patches) = (elements.laws, scene.patches);
-        let ([displacement, remainder], of) = (moved, partitions.clone());
-        let scatter = Scatter::from(elements.partitions.nodes(&of).start, &mut *force);
-        let kernel = PatchForces {
-            laws,
-            patches,
-            partitions: of,
-            displacement,
-            remainder,
-            force: scatter,
-            visitor,
-            extension: NoExtension,
-        };
-        let mut extremes = if is_extended {
-            let extension = extension_of(patches.tiles(), fibres, past);
-            extended_patch_forces(kernel.with_extension(extension, bounds))
+    let bounds = MaybeBound(visitor.bounds());
+    let mut extremes = if fibres.is_some() || past.is_some() {
+        let extension = (fibres, past);
+        forces_with_extension(scene, partitions.clone(), moved, volumes, force, bounds, extension)
+    } else if scene.element().is_nodal_strain() {
+        V::patch_forces(patch_kernel(scene, partitions.clone(), moved, force, visitor))
+    } else {
+        let (elements, of) = (scene.elements(), partitions.clone());
+        if scene.element().is_nodal_pressure() {
+            let pressure = MeanPressure::new(scene.volume_rows(volumes));
+            V::nodal_pressure_forces(InternalForces::of_partitions(elements, pressure, of, moved, force, visitor))
         } else {
-            V::patch_forces(kernel)
-        };
+            V::forces(InternalForces::of_partitions(elements, OwnPressure, of, moved, force, visitor))
+        }
+    };
+    if scene.element().is_nodal_strain() {
+        let [displacement, _] = moved;
         let least = crushed_forces(scene, partitions, displacement, volumes, force, bounds.0);
         extremes.least_change = extremes.least_change.min(least);
-        extremes
-    } else if scene.element().is_nodal_pressure() {
+    }
+    extremes
+}
+
+/// The forces of patches.
+fn patch_kernel<'a, M: ElementMaterial, V>(
+    scene: SceneView<'a, M>,
+    partitions: Range<usize>,
+    [displacement, remainder]: [&'a [NodeVector]; 2],
+    force: &'a mut [NodeVector],
+    visitor: V,
+) -> PatchForces<'a, M::Law, V> {
+    let Elements { laws, partitions: all, .. } = scene.elements();
+    let force = Scatter::from(all.nodes(&partitions).start, force);
+    let (patches, extension) = (scene.patches, NoExtension);
+    PatchForces { laws, patches, partitions, displacement, remainder, force, visitor, extension }
+}
+
+/// The same of tissue with fibres or that relaxes, without the forces of crushed elements. Not inlined: only such tissue
+/// has this stack.
+#[inline(never)]
+fn forces_with_extension<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    partitions: Range<usize>,
+    moved: [&[NodeVector]; 2],
+    volumes: &[NodeVector],
+    force: &mut [NodeVector],
+    bounds: MaybeBound,
+    (fibres, past): (Option<Fibrous<'_>>, Option<PastOfPart<'_>>),
+) -> Extremes<f32> {
+    if scene.element().is_nodal_strain() {
+        let extension = extension_of(scene.patches.tiles(), fibres, past);
+        return extended_patch_forces(patch_kernel(scene, partitions, moved, force, bounds).with_extension(extension));
+    }
+    let (elements, extension) = (scene.elements(), extension_of(scene.tiles, fibres, past));
+    if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
-        let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
-        if is_extended {
-            let extension = extension_of(scene.tiles, fibres, past);
-            extended_nodal_pressure_forces(kernel.with_extension(extension, bounds))
-        } else {
-            V::nodal_pressure_forces(kernel)
-        }
+        let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, bounds);
+        extended_nodal_pressure_forces(kernel.with_extension(extension))
     } else {
-        let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
-        if is_extended {
-            let extension = extension_of(scene.tiles, fibres, past);
-            extended_forces(kernel.with_extension(extension, bounds))
-        } else {
-            V::forces(kernel)
-        }
+        let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, bounds);
+        extended_forces(kernel.with_extension(extension))
     }
 }
 
