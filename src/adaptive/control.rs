@@ -113,17 +113,17 @@ impl Control {
         self.left_behind = self.left_behind.map(|error| kept * error);
     }
 
-    /// Instruments and targets go this way (m) in the next step of so many seconds. Gives whether exact steps are to meet them,
-    /// and not the step beyond the critical one which was to come, with these estimates of the mean and the largest error.
-    pub(super) fn meets(&mut self, way: f32, seconds: f32, errors: [f32; 2]) -> bool {
+    /// Enters how far (m) instruments and targets go in a step of so many seconds. Gives whether exact steps are to meet them.
+    pub(super) fn enter_way(&mut self, way: f32, seconds: f32) -> bool {
         let (before, speed) = (libm::exp2f(-seconds / HALF_LIFE) * self.speed, way / seconds);
         self.speed = speed.max(before);
-        let meets = exceeds(way, LONG_WAY * self.tolerance) && speed > FASTER * before && self.halvings().is_some();
-        if meets {
-            self.shorten(MOST, errors);
-            self.probe = Probe::Begins;
-        }
-        meets
+        exceeds(way, LONG_WAY * self.tolerance) && speed > FASTER * before
+    }
+
+    /// Exact steps follow, with a probe at once; these estimates of the mean and the largest error are left behind, m.
+    pub(super) fn go_exactly(&mut self, errors: [f32; 2]) {
+        self.shorten(MOST, errors);
+        self.probe = Probe::Begins;
     }
 
     /// Whether a probe begins with the next step.

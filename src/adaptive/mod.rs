@@ -338,7 +338,7 @@ impl AdaptiveView<'_> {
             taken.exact += 1;
             let seconds = state.last_step();
             control.wait(seconds);
-            let _ = control.meets(loads.way(state.time() - f64::from(seconds), seconds), seconds, [0.0; 2]);
+            control.enter_way(loads.way(state.time() - f64::from(seconds), seconds), seconds);
             let [mean, _] = control.left_behind();
             worst = worst.worse(judged(status, mean, tolerance));
             if control.probes() {
@@ -398,9 +398,8 @@ impl AdaptiveView<'_> {
                 return Ok(worst);
             }
             let loads = loads.of_step(&state, seconds, count - done);
-            let estimate = self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
-            let way = loads.way(state.time(), seconds);
-            if self.chooser.control.meets(way, seconds, estimate) {
+            if self.chooser.control.enter_way(loads.way(state.time(), seconds), seconds) {
+                self.chooser.control.go_exactly(self.errors());
                 self.change(scene, None, state, threads, taken);
                 return Ok(worst);
             }
@@ -419,7 +418,7 @@ impl AdaptiveView<'_> {
             let before = self.watch.comparisons();
             let guard = GuardView { second: self.second, watch: self.watch, storage: second };
             let _ = guard.follow(Status::Ok, scene, &loads, state.reborrow(), threads);
-            let estimate = self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
+            let estimate = self.errors();
             let control = &mut self.chooser.control;
             if !status.is_taken() {
                 control.refused(estimate);
@@ -435,6 +434,11 @@ impl AdaptiveView<'_> {
             }
         }
         Ok(worst)
+    }
+
+    /// The guard's estimates of the mean and the largest error, m.
+    fn errors(&self) -> [f32; 2] {
+        self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest])
     }
 
     /// Goes over to the length that was decided upon, with the loads that acted until now, if they still do.

@@ -54,6 +54,9 @@ impl<'a> Instrument<'a> {
     /// Where it is at `time`, s.
     /// How far it goes between two times (s), m.
     pub(crate) fn way(&self, times: [f64; 2]) -> f32 {
+        if times[0] >= self.times[1] {
+            return 0.0;
+        }
         let [from, to] = times.map(|time| self.placement(time).position);
         from.distance(to)
     }

@@ -53,8 +53,7 @@ class Instrument:
 @dataclasses.dataclass(frozen=True)
 class Touch:
     """What an instrument felt: force of the tissue in the latest step and on average over the latest call (N; with
-    method "auto" that of its last step), moment about its
-    position (N m), nodes and triangles that it pushes, how deep these would have been inside it (m)."""
+    method "auto" that of its last step), moment about its position (N m), nodes and triangles that it pushes, how deep these would have been inside it (m)."""
 
     force: NDArray[np.float64]
     mean_force: NDArray[np.float64]

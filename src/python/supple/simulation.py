@@ -532,8 +532,7 @@ class Simulation:
     @_one_at_a_time
     def advance(self, seconds: float) -> Report:
         """Moves on by so many seconds; learned steps end at the nearest of the network's, and a span shorter than a sixteenth
-        of the last step is left to the next call. Raises `Diverged` where a step is refused: the
-        state is then the last good one."""
+        of the last step is left to the next call. Raises `Diverged` where a step is refused: the state is then the last good one."""
         if not (np.isfinite(seconds) and seconds > 0.0):
             raise InputError(f"advance by {seconds} s: it must be a positive number")
         self._warn_once()
@@ -580,8 +579,8 @@ class Simulation:
     @_one_at_a_time
     def settle(self, metre: float, *, most_steps: int = 10_000) -> Settled:
         """Brings the body to rest under its loads and instruments, as they act at the present time, which stands still: every node to within
-        about `metre` of where it rests, ablations as far as they are due. Velocities are zero afterwards. Each of the steps takes about as long as an exact one. Raises
-        `Diverged` where a step is refused."""
+        about `metre` of where it rests, ablations as far as they are due. Velocities are zero afterwards. Each of the steps takes about as
+        long as an exact one. Raises `Diverged` where a step is refused."""
         if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
             raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
         if not (np.isfinite(metre) and metre > 0.0):

@@ -98,12 +98,13 @@ impl SceneInstruments {
             return Err(file.problem(first, "learned steps cannot meet instruments; method = \"long\" can"));
         }
         let all: Vec<_> = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
-        let inside: Vec<_> = all.iter().flat_map(MovedInstrument::axis).collect();
-        if !inside.is_empty() {
-            let located = VecPoints::locate(&body.checked()?, &inside).map_err(Problem::of)?;
+        let axes: Vec<_> = all.iter().map(MovedInstrument::axis).collect();
+        let places = axes.concat();
+        if !places.is_empty() {
+            let located = VecPoints::locate(&body.checked()?, &places).map_err(Problem::of)?;
             let mut points = located.points();
-            for (at, instrument) in tables.iter().zip(&all) {
-                let own = points.split_off(..instrument.axis().len()).unwrap_or_default();
+            for (at, axis) in tables.iter().zip(&axes) {
+                let own = points.split_off(..axis.len()).unwrap_or_default();
                 if own.iter().any(|point| point.distance == 0.0) {
                     let message = "this instrument starts inside the body; let its path begin outside";
                     return Err(file.problem(at, message));

@@ -72,18 +72,14 @@ pub(crate) fn loose_part(file: &SceneFile, body: &Body, held: impl Iterator<Item
     for node in held {
         holds[root(&mut towards, node) as usize] = true;
     }
+    // A mesh with nodes that belong to no element is refused.
     let mut nodes = vec![0_usize; towards.len()];
-    for &node in body.mesh.tets.as_flattened() {
-        // Others belong to no element.
-        nodes[node as usize] = 1;
+    for node in 0..towards.len() as u32 {
+        nodes[root(&mut towards, node) as usize] += 1;
     }
-    let mut of_part = vec![0_usize; towards.len()];
-    for node in (0..towards.len() as u32).filter(|&node| nodes[node as usize] > 0) {
-        of_part[root(&mut towards, node) as usize] += 1;
-    }
-    let parts = || of_part.iter().zip(&holds).filter(|(count, _)| **count > 0);
-    let (all, loose) = (parts().count(), parts().filter(|(_, holds)| !**holds).count());
-    let largest = parts().filter(|(_, holds)| !**holds).map(|(count, _)| *count).max()?;
+    let parts: Vec<_> = nodes.into_iter().zip(holds).filter(|(nodes, _)| *nodes > 0).collect();
+    let loose: Vec<_> = parts.iter().filter(|(_, holds)| !holds).map(|(nodes, _)| *nodes).collect();
+    let (all, loose, largest) = (parts.len(), loose.len(), loose.iter().max()?);
     (loose < all).then(|| {
         let message = format!(
             "the mesh has {all} parts that share no node, and nothing holds {loose} of them, of up to {largest} nodes; merge \

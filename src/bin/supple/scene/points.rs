@@ -56,10 +56,9 @@ impl ScenePoints {
 
     /// What is outside the mesh and how far, with the place of its entry.
     pub(crate) fn warnings(&self, file: &SceneFile) -> Vec<String> {
-        /// m; a point on the surface may be outside by rounding.
-        const LEAST: f32 = 5e-6;
         let points = self.followed.as_ref().map_or(&[][..], VecPoints::points);
-        let entries = file.scene.point.iter().zip(&self.names).zip(points).filter(|(_, point)| point.distance > LEAST);
+        let entries =
+            file.scene.point.iter().zip(&self.names).zip(points).filter(|(_, point)| is_outside(point.distance));
         let warning = |((at, name), distance): ((&Spanned<PointTable>, &String), f32)| {
             let message =
                 format!("point {name:?} is {:.2} mm outside the mesh: it follows the nearest point", 1e3 * distance);
@@ -67,4 +66,10 @@ impl ScenePoints {
         };
         entries.map(|(entry, point)| warning((entry, point.distance))).collect()
     }
+}
+
+/// Whether a point at this distance (m) from the mesh is outside it: one on the surface may be by rounding.
+pub(super) fn is_outside(distance: f32) -> bool {
+    const ROUNDING: f32 = 5e-6;
+    distance > ROUNDING
 }

@@ -12,6 +12,7 @@ use toml::Spanned;
 use super::body::Body;
 use super::file::SceneFile;
 use super::instruments::{checked_path, positive, short_part};
+use super::points::is_outside;
 use super::select::select;
 use crate::problem::Problem;
 
@@ -126,8 +127,6 @@ impl ScenePulls {
 
     /// Pulls that move nothing or are outside the mesh, with the place of their entry.
     pub(crate) fn warnings(&self, file: &SceneFile, supports: &[Support]) -> Vec<String> {
-        /// m; a point on the surface may be outside by rounding.
-        const LEAST: f32 = 5e-6;
         let held = |node: u32| {
             let own = supports.iter().filter(|support| support.node == node);
             own.fold(Axes::NONE, |axes, support| axes.union(support.axes))
@@ -139,7 +138,7 @@ impl ScenePulls {
             Some(file.problem(at, remark).to_string())
         };
         let mut remarks: Vec<_> = file.scene.pull.iter().zip(&self.all).filter_map(remark).collect();
-        for (at, pull) in file.scene.pull.iter().zip(&self.all).filter(|(_, pull)| pull.outside > LEAST) {
+        for (at, pull) in file.scene.pull.iter().zip(&self.all).filter(|(_, pull)| is_outside(pull.outside)) {
             let message = format!(
                 "point is {:.2} mm outside the mesh: the nearest element is pulled; places are in metres",
                 1e3 * pull.outside
