@@ -701,7 +701,8 @@ typedef struct supple_scene supple_scene;
 
 /**
  * A scene in motion with all that it needs. One thread at a time. A copy by memcpy, to memory that is aligned to
- * SUPPLE_ALIGN, goes on as the original would, to the bit.
+ * SUPPLE_ALIGN, goes on as the original would, to the bit; it has the memory that is in use, and supple_sim_set refuses
+ * steps that need more (SUPPLE_E_SHORT).
  */
 typedef struct supple_sim supple_sim;
 
@@ -2255,7 +2256,9 @@ supple_status supple_copy_forces(const supple_state *state,
  * Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes
  * each.
  *
- * @param tetrahedra four nodes of each element, from zero.
+ * @param tetrahedra four nodes of each element, from zero. Of an element with a negative volume the triangles are seen from
+ * within, and a pressure on them pulls: turn such elements before, also where the scene is built with
+ * SUPPLE_WINDING_NORMALISED, which does not change this array.
  * @param triangles room for `room` of them; four for each element are needed while they are found.
  * @param count receives how many at the beginning are of the boundary.
  */
@@ -2331,7 +2334,7 @@ supple_status supple_follow(const supple_state *state,
 
 /**
  * Writes how many bytes of scratch supple_displacement_field needs: 2 for each point of the grid where spacings are alike,
- * some 12 at most, and 8 more for each where the reach is below eight spacings.
+ * some 12 at most, and 8 more for each where the reach is below sixteen spacings.
  *
  * @param reach as there, m.
  * @param error may be NULL; SUPPLE_E_GRID: axis and value tell what is wrong with it.
@@ -2354,7 +2357,7 @@ supple_status supple_displacement_field_size(const supple_image_grid *grid,
  * @param tetrahedra four nodes of each of `elements`, of either winding.
  * @param displacements of all nodes, m, as supple_displacements tells where those of a state are; or your own.
  * @param kind SUPPLE_FORWARD_FIELD or SUPPLE_INVERSE_FIELD.
- * @param reach how far from the tissue the field ends, m; 0: it goes on.
+ * @param reach how far from the tissue the field ends, m, to within a quarter of it or two spacings of the grid; 0: it goes on.
  * @param scratch of `bytes`, supple_displacement_field_size at least, aligned to 4; free again afterwards.
  * @param field room for `floats`, three for each point of the grid at least.
  * @param covered may be NULL; receives how many points are within the tissue. With none the field is zero: the grid is
@@ -2934,11 +2937,14 @@ supple_status supple_sim_set_tissues(supple_sim *sim,
 /**
  * Lets a simulation that has just been set up go on where another one is, of a body of the same points: without some
  * elements (supple_scene_config.removed), with other tissues, another kind of element or other supports. It takes over
- * displacements, velocities, time, gravity, forces, motions, pressures, pulls, and where it has a surface the instruments with what
- * they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. Nodes that belong to no
+ * displacements, velocities, time, gravity, forces, motions, pulls, and where it has a surface the instruments with what
+ * they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. It takes over pressures
+ * where no element goes. Where some do there is none: the triangles would go on to press the surface that is gone, so set
+ * one up on what is left of it, with or without the cut (supple_pressure_init, supple_set_pressure). Nodes that belong to no
  * element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
- * is left as it is, may go on, and its memory be used for the next exchange. supple_sim_setup, which takes longest, may
- * run on another thread while the other simulation goes on. This takes as long as supple_sim_set.
+ * is only read, may go on, and its memory be used for the next exchange; but the pulls are an object of both, so where it goes
+ * on these have let go in it as well. What is refused changes none of this. supple_sim_setup, which takes longest, may run on another thread
+ * while the other simulation goes on. This takes as long as supple_sim_set.
  *
  * @param from points and kind of contact are checked (SUPPLE_E_MISMATCH); room for its forces, motions and held nodes
  * must be there (SUPPLE_E_CAPACITY).

@@ -313,6 +313,32 @@ impl VecPressure {
         Ok(surface)
     }
 
+    /// Takes triangles away whose nodes are no face of one of these elements any more. A surface that is open then does not
+    /// fill.
+    pub(crate) fn let_go_of_removed<'a>(&mut self, tets: impl Iterator<Item = &'a [u32; 4]>) {
+        let sorted = |mut nodes: [u32; 3]| {
+            nodes.sort_unstable();
+            nodes
+        };
+        let mut left: std::collections::HashMap<_, _> =
+            self.triangles.iter().map(|triangle| (sorted(triangle.nodes), false)).collect();
+        for &[a, b, c, d] in tets {
+            for face in [[a, b, c], [a, b, d], [a, c, d], [b, c, d]] {
+                if let Some(is_left) = left.get_mut(&sorted(face)) {
+                    *is_left = true;
+                }
+            }
+        }
+        let Self { triangles, surfaces } = self;
+        triangles.retain(|triangle| {
+            let is_left = left.get(&sorted(triangle.nodes)) == Some(&true);
+            if let Some(surface) = surfaces.get_mut(triangle.surface as usize).filter(|_| !is_left) {
+                surface.bulk = 0.0;
+            }
+            is_left
+        });
+    }
+
     /// Takes all away.
     pub fn clear(&mut self) {
         self.triangles.clear();

@@ -246,7 +246,9 @@ impl ReactionModel {
         let count = (now.steps - before.steps) as f64;
         // Forces are those at the start of a step. Those in the middle of the time are between those of the last steps
         // of both calls.
-        let share = if before.steps == 0 { 1.0 } else { (count + 1.0) / (2.0 * count) };
+        // A state at its start, restored or exchanged has none.
+        let has_none = before.weighted.force == DVec3::ZERO && before.alone.force == DVec3::ZERO;
+        let share = if before.steps == 0 || has_none { 1.0 } else { (count + 1.0) / (2.0 * count) };
         let of = |before: &Sums, now: &Sums| {
             let damped = 0.5 * f64::from(self.damping) * (before.momentum + now.momentum);
             let force = before.force + share * (now.force - before.force);

@@ -106,11 +106,14 @@ pub unsafe extern "C" fn supple_sim_set_tissues(
 
 /// Lets a simulation that has just been set up go on where another one is, of a body of the same points: without some
 /// elements (supple_scene_config.removed), with other tissues, another kind of element or other supports. It takes over
-/// displacements, velocities, time, gravity, forces, motions, pressures, pulls, and where it has a surface the instruments with what
-/// they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. Nodes that belong to no
+/// displacements, velocities, time, gravity, forces, motions, pulls, and where it has a surface the instruments with what
+/// they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. It takes over pressures
+/// where no element goes. Where some do there is none: the triangles would go on to press the surface that is gone, so set
+/// one up on what is left of it, with or without the cut (supple_pressure_init, supple_set_pressure). Nodes that belong to no
 /// element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
-/// is left as it is, may go on, and its memory be used for the next exchange. supple_sim_setup, which takes longest, may
-/// run on another thread while the other simulation goes on. This takes as long as supple_sim_set.
+/// is only read, may go on, and its memory be used for the next exchange; but the pulls are an object of both, so where it goes
+/// on these have let go in it as well. What is refused changes none of this. supple_sim_setup, which takes longest, may run on another thread
+/// while the other simulation goes on. This takes as long as supple_sim_set.
 ///
 /// @param from points and kind of contact are checked (SUPPLE_E_MISMATCH); room for its forces, motions and held nodes
 /// must be there (SUPPLE_E_CAPACITY).
@@ -139,10 +142,13 @@ pub unsafe extern "C" fn supple_sim_carry_on(
         let (open, former) = (OpenScene::of(new.scene)?, OpenScene::of(old.scene)?);
         let (mut to, before) = (opened_of(&open, new.state)?, opened_of(&former, old.state)?);
         can_take_over(new.loads, old.loads, &open)?;
-        // The last that may be refused.
+        let pulls = memory::read(old.loads.cast_const())?.pulls();
+        if !pulls.is_null() {
+            memory::is(pulls.cast_const())?;
+        }
         take_over_instruments(&new, &old)?;
-        take_over(new.loads, old.loads)?;
-        let_go_of_removed(memory::read(new.loads.cast_const())?.pulls(), &open)?;
+        let same_surface = open.view().element_count() == former.view().element_count();
+        take_over(new.loads, old.loads, same_surface)?;
         copy(to.displacement, before.displacement);
         copy(to.remainder, before.remainder);
         copy(to.increment, before.increment);
@@ -154,6 +160,8 @@ pub unsafe extern "C" fn supple_sim_carry_on(
         let clock = (*from).clock();
         (*sim).set_clock(clock);
         prepare(sim, settings)?;
+        // In the object of both: only where nothing is refused any more.
+        let_go_of_removed(pulls, &open)?;
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.

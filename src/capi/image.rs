@@ -38,7 +38,7 @@ impl supple_image_grid {
 }
 
 /// Writes how many bytes of scratch supple_displacement_field needs: 2 for each point of the grid where spacings are alike,
-/// some 12 at most, and 8 more for each where the reach is below eight spacings.
+/// some 12 at most, and 8 more for each where the reach is below sixteen spacings.
 ///
 /// @param reach as there, m.
 /// @param error may be NULL; SUPPLE_E_GRID: axis and value tell what is wrong with it.
@@ -76,7 +76,7 @@ fn bytes_for(grid: &ImageGrid, reach: f32) -> Answer<usize> {
 /// @param tetrahedra four nodes of each of `elements`, of either winding.
 /// @param displacements of all nodes, m, as supple_displacements tells where those of a state are; or your own.
 /// @param kind SUPPLE_FORWARD_FIELD or SUPPLE_INVERSE_FIELD.
-/// @param reach how far from the tissue the field ends, m; 0: it goes on.
+/// @param reach how far from the tissue the field ends, m, to within a quarter of it or two spacings of the grid; 0: it goes on.
 /// @param scratch of `bytes`, supple_displacement_field_size at least, aligned to 4; free again afterwards.
 /// @param field room for `floats`, three for each point of the grid at least.
 /// @param covered may be NULL; receives how many points are within the tissue. With none the field is zero: the grid is

@@ -279,11 +279,11 @@ pub(super) unsafe fn can_take_over(
     }
 }
 
-/// Takes over gravity, forces, motions, pressures and pulls, where [`can_take_over`].
+/// Takes over gravity, forces, motions and pulls, where [`can_take_over`], and pressures on the same surface.
 ///
 /// # Safety
 /// As at [`memory::change`].
-pub(super) unsafe fn take_over(loads: *mut supple_loads, from: *mut supple_loads) -> Answer<()> {
+pub(super) unsafe fn take_over(loads: *mut supple_loads, from: *mut supple_loads, same_surface: bool) -> Answer<()> {
     // SAFETY: the caller's promise; entries up to the counts were written.
     unsafe {
         let ((object, mut arrays), (old, mut before)) = (memory::open(loads)?, memory::open(from)?);
@@ -292,7 +292,10 @@ pub(super) unsafe fn take_over(loads: *mut supple_loads, from: *mut supple_loads
         copy(arrays.change_first(old.forces as usize, object.force_room as usize), forces);
         copy(arrays.change_first(old.motions as usize, object.motion_room as usize), motions);
         (object.forces, object.motions, object.gravity) = (old.forces, old.motions, old.gravity);
-        (object.pulls, object.pressure) = (old.pulls, old.pressure);
+        object.pulls = old.pulls;
+        if same_surface {
+            object.pressure = old.pressure;
+        }
         Ok(())
     }
 }

@@ -93,7 +93,8 @@ pub struct supple_settings {
 }
 
 /// A scene in motion with all that it needs. One thread at a time. A copy by memcpy, to memory that is aligned to
-/// SUPPLE_ALIGN, goes on as the original would, to the bit.
+/// SUPPLE_ALIGN, goes on as the original would, to the bit; it has the memory that is in use, and supple_sim_set refuses
+/// steps that need more (SUPPLE_E_SHORT).
 #[repr(C, align(64))]
 pub struct supple_sim {
     head: Head,
@@ -674,7 +675,8 @@ pub(super) unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objec
             if contact > 0 && loads.contact().addr() == address + contact {
                 loads.set_contact(objects.contact);
             }
-            (*sim).address = sim.addr();
+            // Of how much memory there is behind it nothing is known.
+            ((*sim).head, (*sim).address) = ((*sim).head.of_bytes(end), sim.addr());
         }
         Ok(objects)
     }

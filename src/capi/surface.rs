@@ -93,7 +93,9 @@ impl<'a> Given<'a> {
 /// Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes
 /// each.
 ///
-/// @param tetrahedra four nodes of each element, from zero.
+/// @param tetrahedra four nodes of each element, from zero. Of an element with a negative volume the triangles are seen from
+/// within, and a pressure on them pulls: turn such elements before, also where the scene is built with
+/// SUPPLE_WINDING_NORMALISED, which does not change this array.
 /// @param triangles room for `room` of them; four for each element are needed while they are found.
 /// @param count receives how many at the beginning are of the boundary.
 #[unsafe(no_mangle)]

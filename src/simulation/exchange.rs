@@ -45,7 +45,8 @@ impl Simulation<'_> {
     /// Goes on with another material and without some more elements: displacements, velocities, time, loads, pulls and
     /// instruments stay, so what stays of the tissue keeps its momentum, and the energy balance begins anew. Nodes that
     /// belong to no element any more stay in all arrays, held where they are. Pulls act on the nodes that are left of
-    /// their patches, or are absent; a surface of [`Simulation::meeting`] follows, one of the caller's loses nodes.
+    /// their patches, or are absent; a surface of [`Simulation::meeting`] follows, one of the caller's loses nodes;
+    /// pressures act on what is left of their surfaces, not on the cut, and an open one fills no more.
     /// Steps are prepared anew, with a lead-in where a network takes them. Reactions must be.
     ///
     /// It takes as long as building the scene and preparing the steps; with other constants only, and exact steps, as
@@ -72,8 +73,9 @@ impl Simulation<'_> {
         let removed = core::mem::replace(&mut self.changes.removed, all);
         let touchable = self.touchable.clone();
         let (pulled, pulls, is_boundary) = (self.pulled.clone(), self.pulls.clone(), self.changes.meets_boundary);
+        let pressures = self.pressures.clone();
         let undo = move |simulation: &mut Self| {
-            (simulation.scene, simulation.touchable) = (former, touchable);
+            (simulation.scene, simulation.touchable, simulation.pressures) = (former, touchable, pressures);
             (simulation.pulled, simulation.pulls) = (pulled, pulls);
             (simulation.changes.removed, simulation.changes.meets_boundary) = (removed, is_boundary);
         };
@@ -230,13 +232,15 @@ impl Simulation<'_> {
         if was_prepared { self.prepare() } else { Ok(()) }
     }
 
-    /// Surface and pulls lose the nodes that belong to no element any more.
+    /// Surface and pulls lose the nodes that belong to no element any more, pressures the triangles.
     fn let_go_of_removed(&mut self) -> Result<(), SimulationError> {
         if self.changes.removed.is_empty() {
             return Ok(());
         }
         let view = self.scene.view();
         let_go_of_removed(view, &mut self.pulled, &mut self.pulls);
+        let left = self.tets.iter().zip(&self.changes.removed).filter(|(_, removed)| !**removed);
+        self.pressures.let_go_of_removed(left.map(|(tet, _)| tet));
         let triangles = !self.touchable.1.is_empty();
         if self.changes.meets_boundary {
             return self.meet_boundary(triangles);

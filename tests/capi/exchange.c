@@ -13,7 +13,7 @@ SUPPLE_MEMORY(first_memory, ROOM);
 SUPPLE_MEMORY(second_memory, ROOM);
 SUPPLE_MEMORY(third_memory, ROOM);
 SUPPLE_MEMORY(contact_memory, 1 << 20);
-SUPPLE_MEMORY(pulls_memory, 1 << 10);
+SUPPLE_MEMORY(pulls_memory, 1 << 13);
 static uint8_t removed[TETS];
 static float of_one[NODES][3], of_other[NODES][3], frozen[NODES][3];
 
@@ -222,6 +222,102 @@ static void refusals_change_nothing(void) {
     CHECK(supple_sim_set_tissues(adaptive, &tissue, 1, &chosen, NULL) == SUPPLE_OK);
 }
 
+/* Pressures act on the surface of their scene, pulls let go, and a refused exchange leaves both sides' pulls as they are. */
+static void pressures_and_pulls(void) {
+    static uint32_t all[4 * TETS][3], pressed[4 * TETS][3], surface_of[4 * TETS];
+    uint32_t count = 0, taken = 0;
+    supple_error error;
+    const supple_settings settings = settings_of(SUPPLE_STEPS_EXACT);
+    body = bar_config();
+    supple_sim *first = set_up(first_memory, &settings);
+    CHECK(supple_boundary(tets[0], TETS, all[0], 4 * TETS, &count) == SUPPLE_OK && count > 0);
+    /* All but the end that is held. */
+    for (uint32_t t = 0; t < count; t++) {
+        const float z = points[all[t][0]][2] + points[all[t][1]][2] + points[all[t][2]][2];
+        if (z > 1e-6f) memcpy(pressed[taken++], all[t], sizeof all[t]);
+    }
+    const size_t bytes = supple_pressure_size(taken, 1);
+    supple_pressure *pressure;
+    CHECK(bytes <= sizeof contact_memory);
+    CHECK(supple_pressure_init(contact_memory, bytes, objects_of(first).scene, points[0], pressed[0], surface_of, taken, 1, &pressure, NULL) == SUPPLE_OK);
+    CHECK(supple_pressure_set(pressure, 0, 2.0f, 0.0f) == SUPPLE_OK && supple_set_pressure(objects_of(first).loads, pressure) == SUPPLE_OK);
+    supple_pulls *pulls;
+    const float *tip = points[NODES - 1];
+    const supple_pull pull = {{tip[0] / 4, tip[1] / 2, 0.45f * tip[2]}, 0.3f * tip[0], 10.0f, 0.0f, {0, 0, 0}};
+    const float target[3] = {pull.at[0], pull.at[1] + 0.1f * tip[0], pull.at[2]};
+    CHECK(supple_pulls_init(pulls_memory, sizeof pulls_memory, objects_of(first).scene, 1, 200, &pulls) == SUPPLE_OK);
+    CHECK(supple_add_pull(pulls, objects_of(first).scene, points[0], &pull, &error) == SUPPLE_OK);
+    CHECK(supple_set_targets(pulls, target, 1, 0.0, 0.0, NULL) == SUPPLE_OK && supple_set_pulls(objects_of(first).loads, pulls) == SUPPLE_OK);
+    advance(first, 10);
+    /* Steps that are too long: refused at the end. */
+    remove_a_part(), body.removed = removed;
+    supple_sim *second = set_up(second_memory, &settings);
+    supple_settings long_steps = settings;
+    long_steps.seconds = 1.0f;
+    const uint64_t before = hash(pulls_memory, sizeof pulls_memory);
+    CHECK(supple_sim_carry_on(second, first, &long_steps, &error) < 0 && hash(pulls_memory, sizeof pulls_memory) == before);
+    /* The surface is another one: no pressure until there is a new one. */
+    second = set_up(second_memory, &settings);
+    CHECK(supple_sim_carry_on(second, first, &settings, &error) == SUPPLE_OK);
+    CHECK(hash(pulls_memory, sizeof pulls_memory) != before);
+    supple_sim *never = set_up(third_memory, &settings);
+    CHECK(supple_set_pulls(objects_of(second).loads, NULL) == SUPPLE_OK);
+    advance(second, FRAMES), advance(never, 1);
+    double most = 0.0;
+    CHECK(supple_copy_displacements(objects_of(second).state, of_one[0], 3 * NODES) == SUPPLE_OK);
+    for (int e = 0; e < TETS; e++) {
+        for (int at = 0; at < 12 && !removed[e]; at++) {
+            const double way = fabs((double)of_one[tets[e][at / 3]][at % 3]);
+            most = way > most ? way : most;
+        }
+    }
+    printf("exchange: without pressure and pulls it is within %.4f mm of its shape at rest\n", 1e3 * most);
+    CHECK(most < 2e-3 * (double)tip[0]);
+}
+
+/* A copy of the bytes in use has no more than these. */
+static void a_copy_has_the_memory_in_use(void) {
+    body = bar_config();
+    const supple_settings exact = settings_of(SUPPLE_STEPS_EXACT), chosen = settings_of(SUPPLE_STEPS_AUTO);
+    size_t bytes;
+    supple_sim *sim;
+    CHECK(supple_sim_size(&body, &chosen, &bytes, NULL) == SUPPLE_OK && bytes <= ROOM);
+    CHECK(supple_sim_setup(first_memory, bytes, &body, &exact, &sim, NULL) == SUPPLE_OK);
+    memcpy(second_memory, first_memory, objects_of(sim).bytes);
+    supple_sim *copy = (supple_sim *)(void *)second_memory;
+    advance(copy, 1);
+    supple_error error;
+    CHECK(supple_sim_set(copy, &chosen, &error) == SUPPLE_E_SHORT && supple_sim_set(copy, &exact, NULL) == SUPPLE_OK);
+    CHECK(supple_sim_set(sim, &chosen, NULL) == SUPPLE_OK);
+}
+
+/* The force of supports is right from the first frame on, also of a body that goes on in another scene. */
+static void supports_bear_the_weight(void) {
+    const supple_settings settings = settings_of(SUPPLE_STEPS_EXACT);
+    body = bar_config(), body.removed = NULL;
+    supple_sim *first = set_up(first_memory, &settings), *second = set_up(second_memory, &settings);
+    set_gravity(first);
+    supple_settled settled;
+    CHECK(supple_settle_size(NODES) <= sizeof third_memory);
+    CHECK(supple_sim_settle(first, 1e-6f, 50000, NULL, third_memory, sizeof third_memory, &settled) == SUPPLE_OK);
+    CHECK(supple_sim_carry_on(second, first, &settings, NULL) == SUPPLE_OK);
+    uint32_t bearing[2 * LAYER];
+    for (int n = 0; n < 2 * LAYER; n++) bearing[n] = supports[n].node;
+    supple_reaction *reaction;
+    CHECK(supple_reaction_size(NODES) <= sizeof third_memory);
+    CHECK(supple_reaction_init(third_memory, sizeof third_memory, objects_of(second).scene, bearing, 2 * LAYER, 20.0f, &reaction, NULL) == SUPPLE_OK);
+    supple_reaction_force force;
+    CHECK(supple_reaction_follow(objects_of(second).scene, objects_of(second).state, reaction, &force) == SUPPLE_OK && !force.known);
+    supple_scene_facts facts;
+    CHECK(supple_scene_describe(objects_of(second).scene, &facts) == SUPPLE_OK);
+    for (int frame = 0; frame < 3; frame++) {
+        advance(second, 1);
+        CHECK(supple_reaction_follow(objects_of(second).scene, objects_of(second).state, reaction, &force) == SUPPLE_OK && force.known);
+        printf("exchange: frame %d: the supports bear %.4f of the weight\n", frame, -(double)force.newton[1] / facts.mass);
+        CHECK(fabs(-(double)force.newton[1] / facts.mass - 1.0) < 0.01);
+    }
+}
+
 /* The objects below a supple_sim: a second scene, and a contact whose surface has changed. */
 static void objects_below(void) {
     body = bar_config();
@@ -256,6 +352,9 @@ int main(void) {
     constants_change(SUPPLE_STEPS_LONG, "long");
     instruments_follow();
     refusals_change_nothing();
+    pressures_and_pulls();
+    a_copy_has_the_memory_in_use();
+    supports_bear_the_weight();
     objects_below();
     return 0;
 }

@@ -5,7 +5,8 @@ use super::*;
 use glam::DVec3;
 use supple::contact::{Instrument, Pose, Shape};
 use supple::loads::Loads;
-use supple::mesh::{Mesh, Winding};
+use supple::mesh::{Mesh, Winding, boundary};
+use supple::pressure::SurfacePressure;
 use supple::scene::FixedScene;
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
@@ -215,6 +216,51 @@ fn pulls_let_go_of_what_is_removed() {
     println!("{gone:?} {half:?}");
     assert_eq!(gone.force, [0.0; 3]);
     assert!(half.force[0] > 0.01);
+}
+
+/// Pressures act on what is left of their surfaces: on the outer faces of a bar whose corner is cut off as on those of a bar
+/// that never had it. An open cavity fills no more.
+#[test]
+fn pressures_let_go_of_the_surface_that_is_removed() {
+    let points: Vec<_> = BAR.points().collect();
+    let gone = elements_where(|[x, _, z]| x > 0.015 && z > 0.06);
+    let tets: Vec<_> = BAR.tets().collect();
+    let faces = |with_gone: bool| {
+        let of = (0..).zip(&tets).filter(|(element, _)| with_gone || !gone.contains(element)).map(|(_, tet)| *tet);
+        let mut faces = boundary(of);
+        faces.retain(|nodes| nodes.iter().any(|&node| points[node as usize][2] > 0.0));
+        faces
+    };
+    let (all, left) = (faces(true), faces(false));
+    let skin: Vec<_> = left.iter().copied().filter(|face| all.contains(face)).collect();
+    assert!(skin.len() < left.len() && skin.len() < all.len());
+    let pressed = |triangles: &[[u32; 3]]| {
+        let mut body = bar(Element::NodalStrain).with(settings(Method::Exact, 30.0));
+        let pressure = SurfacePressure { volume: 1e-4, bulk: 1.0, ..SurfacePressure::new(20.0, 0.0) };
+        body.pressures.press(&points, triangles, pressure).unwrap();
+        body
+    };
+    let mut cut = pressed(&all);
+    cut.advance(0.05).unwrap();
+    cut.remove(&gone).unwrap();
+    assert_eq!(cut.pressures.surfaces[0].bulk, 0.0);
+    let mut never = pressed(&skin);
+    never.pressures.surfaces[0].bulk = 0.0;
+    never.remove(&gone).unwrap();
+    for body in [&mut cut, &mut never] {
+        assert!(body.settle(1e-6, 20_000).unwrap().at_rest);
+    }
+    let alone = |node: usize| cut.scene().view().is_alone(node);
+    let (mut off, mut way) = (0.0f32, 0.0f32);
+    for (node, (a, b)) in
+        cut.displacements().iter().zip(never.displacements()).enumerate().filter(|(node, _)| !alone(*node))
+    {
+        let [a, b] = [a, b].map(|moved| glam::Vec3::from(moved.to_array()));
+        assert!(a.is_finite(), "{node}");
+        (off, way) = (off.max(a.distance(b)), way.max(b.length()));
+    }
+    println!("{:.4} mm off of {:.2} mm", 1e3 * off, 1e3 * way);
+    assert!(off < 1e-2 * way && way > 1e-4);
 }
 
 /// Evenly between 0 and 1.

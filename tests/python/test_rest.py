@@ -98,6 +98,31 @@ def test_a_free_body_shrinks_under_a_pressure_by_its_bulk_modulus():
     assert abs(pressure.volume / volume - 1.0) < 1e-5
 
 
+def test_pressures_let_go_of_what_is_removed():
+    """They act on what is left of their surfaces, as on a body that never had more; a surface that is open then does not fill."""
+    cut, never = held(damping=20.0), held(damping=20.0)
+    mesh = cut.scene.mesh
+    gone = mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.6 * mesh.points[:, 0].max()
+    sides = mesh.boundary()
+    sides = sides[(mesh.points[sides][:, :, 0] > 1e-6).any(axis=1)]
+    pressure = cut.add_pressure(sides, 15.0)
+    pressure.fill(1e-4, 1.0)
+    assert cut.advance(0.1).ok
+    cut.remove(gone)
+    assert pressure._filling == (0.0, 0.0) and pressure.pascal == 15.0
+    left = {tuple(sorted(nodes)) for nodes in supple.mesh.boundary_of(np.ascontiguousarray(mesh.tets[~gone])).tolist()}
+    never.add_pressure(np.array([nodes for nodes in sides.tolist() if tuple(sorted(nodes)) in left]), 15.0)
+    never.remove(gone)
+    for simulation in (cut, never):
+        assert simulation.settle(1e-6).at_rest
+    used = np.unique(mesh.tets[~gone])
+    off = np.linalg.norm(cut.displacements[used] - never.displacements[used], axis=1).max()
+    most = np.linalg.norm(never.displacements[used], axis=1).max()
+    print(f"{1e3 * off:.4f} mm off of {1e3 * most:.2f} mm")
+    assert off < 0.01 * most + 2e-6 and most > 1e-5
+    cut.add_pressure(sides[:1], 1.0)
+
+
 def test_pressures_are_added_changed_and_cleared():
     simulation = held(damping=20.0)
     mesh = simulation.scene.mesh

@@ -286,7 +286,13 @@ class Simulation:
         if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
             raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
         numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
-        made = [*self._pressures, Pressure(self, len(self._pressures), numbers)]
+        added = Pressure(self, len(self._pressures), numbers)
+        added._pascal, added._ramp = pascal, ramp
+        self._set_pressures([*self._pressures, added])
+        return added
+
+    def _set_pressures(self, made: list[Pressure]) -> None:
+        points = self.scene.mesh.points
         rows = np.concatenate([one._numbers for one in made])
         surface_of = np.concatenate([np.full(len(one._numbers) // 3, one._surface, np.uint32) for one in made])
         memory = library.Memory(lib.supple_pressure_size(len(surface_of), len(made)))
@@ -296,13 +302,11 @@ class Simulation:
             library.pointer("uint32_t", surface_of), len(surface_of), len(made), raw, error,
         )  # fmt: skip
         library.checked(status, error, "pressure")
-        for one, (value, time) in zip(made, [*((one._pascal, one._ramp) for one in self._pressures), (pascal, ramp)]):
-            library.checked(lib.supple_pressure_set(raw[0], one._surface, value, time), what="pressure")
+        for one in made:
+            library.checked(lib.supple_pressure_set(raw[0], one._surface, one._pascal, one._ramp), what="pressure")
             library.checked(lib.supple_pressure_fill(raw[0], one._surface, *one._filling), what="pressure")
-        made[-1]._pascal, made[-1]._ramp = pascal, ramp
         library.checked(lib.supple_set_pressure(self._loads, raw[0]))
         self._pressures, self._pressure_memory, self._pressure = made, memory, raw[0]
-        return made[-1]
 
     @_one_at_a_time
     def clear_pressures(self) -> None:
@@ -449,7 +453,8 @@ class Simulation:
     @_one_at_a_time
     def remove(self, elements: ArrayLike) -> None:
         """Removes elements, as numbers or as a mask over all, as a resection does: see `exchange`. Nodes without an element stay in all
-        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed."""
+        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed, and pressures act on
+        what is left of their surfaces, not on the cut; an open one fills no more."""
         scene = self.scene
         removed = scene._removed.copy()
         removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
@@ -679,7 +684,8 @@ class Simulation:
 
     @_one_at_a_time
     def restore(self, saved: bytes) -> None:
-        """Puts the state back; steps go on from there, a network's after a lead-in."""
+        """Puts the state back; steps go on from there, a network's after a lead-in. Exact steps of a given length without pulls go on to the
+        bit; pulls are turned as the tissue is now."""
         data = np.frombuffer(saved, np.uint8)
         library.checked(lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data)), what="restore")
         self._prepare_again()
