@@ -1,17 +1,18 @@
 //! How far cells are from the tissue, and what is left of a field there. The squared distance to the nearest known cell
-//! is a minimum along one axis after the other (Felzenszwalb & Huttenlocher 2012); cells of an eighth of the reach need
-//! eight neighbours to either side.
+//! is a minimum along one axis after the other (Felzenszwalb & Huttenlocher 2012); cells of at most an eighth of the reach
+//! need few neighbours to either side. Distances count from the cell next to a known one, so that nothing is lost between
+//! the tissue and there: the field would jump from one point of a fine grid to the next.
 
 use super::pyramid::Level;
 use crate::copy::copy;
 
-/// Cells within a reach.
+/// Cells within a reach, and at most where one axis has longer cells than another.
 const CELLS: f64 = 8.0;
+const MOST_CELLS: f64 = 24.0;
 
-/// Whether cells are at least an eighth of the reach long, m.
-pub(super) fn is_coarse_enough(level: &Level, reach: f32) -> bool {
-    let long = (0..3).filter(|&axis| level.size[axis] > 1);
-    long.map(|axis| level.cell[axis]).all(|cell| cell * CELLS >= f64::from(reach))
+/// Whether cells are at most an eighth of the reach (m) long, or no longer than those of the grid.
+pub(super) fn is_fine_enough(level: &Level, grid: &Level, reach: f32) -> bool {
+    (0..3).all(|axis| level.cell[axis] <= grid.cell[axis].max(f64::from(reach) / CELLS))
 }
 
 /// Writes for each cell what is left of the field there: 1 where it is known, 0 from the reach (m) on. `second` is scratch
@@ -25,7 +26,7 @@ pub(super) fn distances(level: &Level, known: &[[f32; 3]], reach: f32, kept: &mu
     for (axis, next) in [x, y, 1].into_iter().enumerate() {
         copy(second, kept);
         let (size, cell) = (level.size[axis], level.cell[axis]);
-        let window = (f64::from(reach) / cell).min(2.0 * CELLS) as usize + 1;
+        let window = (f64::from(reach) / cell).min(MOST_CELLS) as usize + 1;
         let length = (size * stride).max(1);
         for (to, from) in kept.chunks_exact_mut(length).zip(second.chunks_exact(length)) {
             for step in 1..=window.min(size.saturating_sub(1)) {
@@ -35,9 +36,12 @@ pub(super) fn distances(level: &Level, known: &[[f32; 3]], reach: f32, kept: &mu
         }
         stride *= next;
     }
-    let over = 1.0 / (reach * reach);
+    let long = (0..3).filter(|&axis| level.size[axis] > 1);
+    let next = long.map(|axis| level.cell[axis]).fold(0.0, f64::max) as f32;
+    let over = 1.0 / (reach - next).max(f32::MIN_POSITIVE);
     for place in kept {
-        let left = (1.0 - *place * over).max(0.0);
+        let share = over * (libm::sqrtf(*place) - next).max(0.0);
+        let left = (1.0 - share * share).max(0.0);
         *place = left * left;
     }
 }

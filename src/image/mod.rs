@@ -15,10 +15,11 @@
 //!   1988): means of what is drawn go up, linear interpolation between them comes down. Near the surface a place has what
 //!   the surface nearby has, far from it the mean of the whole; each component is between the least and the largest that
 //!   was drawn (to rounding). Interpolation is continuous on every level.
-//! - With a reach these fall off to zero, by `(1 - d^2 / reach^2)^2` at the distance `d` from the tissue. So that d is
-//!   found in bounded time, it is that between cells of at most an eighth of the reach or a point of the grid, whichever
-//!   is larger, and linear between them. The slope is at most 1.54 times the displacement over the reach: from a reach of
-//!   1.54 times the largest displacement on the fall does not fold space.
+//! - With a reach these fall off to zero, by `(1 - (d - c)^2 / (reach - c)^2)^2` from the distance `d = c` from the tissue
+//!   on. So that d is found in bounded time, it is that between cells and linear between them; c is their longest edge, at
+//!   most an eighth of the reach or the spacing of the grid, whichever is larger. So the field ends at the reach to within
+//!   two cells. The slope is at most `1.54 / (reach - c)` times the displacement: where that is below one, the fall does not fold
+//!   space.
 //!
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]

@@ -56,8 +56,10 @@ impl Pyramid {
             // There is room.
             let _ = levels.push(level);
         }
-        let fading = levels.iter().position(|level| fade::is_coarse_enough(level, reach));
-        let fading = fading.unwrap_or(levels.len().saturating_sub(1));
+        let fine = levels
+            .first()
+            .map_or(0, |grid| levels.iter().take_while(|level| fade::is_fine_enough(level, grid, reach)).count());
+        let fading = fine.saturating_sub(1);
         Self { levels, reach, fading }
     }
 

@@ -139,6 +139,9 @@ fn a_reach_ends_the_field() {
             let fuzzy = 2.0 * 1.8 * (2.0 * f64::from(reach) / 8.0).max(spacing);
             let kept = |way: f64| (1.0 - (way.max(0.0) / f64::from(reach)).powi(2)).max(0.0).powi(2);
             let (most, least) = (0.002 * kept(distance - fuzzy), 0.002 * kept(distance + fuzzy));
+            // Zero to within a cell.
+            let ends = f64::from(reach) + 2.0 * (f64::from(reach) / 8.0).max(spacing) + spacing;
+            assert!(value[1] == 0.0 || distance < ends, "{distance} of {reach}");
             let length = f64::from(value[1]);
             assert!(
                 length <= most + 1e-8 && length >= least - 1e-8,
@@ -149,6 +152,22 @@ fn a_reach_ends_the_field() {
             }
         }
     }
+}
+
+/// As in computed tomography, with slices far apart.
+#[test]
+fn a_reach_does_not_fold_space_between_long_voxels() {
+    let (moved_by, spacing, size) = (0.02, [0.5e-3, 0.5e-3, 6e-3], [300, 300, 26]);
+    let displacements = moved(|_| glam::DVec3::new(moved_by, 0.0, 0.0));
+    let grid = ImageGrid::aligned([-0.06, -0.06, -0.05], spacing, size);
+    // The least that the module promises.
+    let reach = 1.54 * moved_by + 6e-3;
+    let (values, _) = field(FieldKind::Forward, grid, reach as f32, &displacements);
+    let rows = values.chunks_exact(size[0] as usize);
+    let slopes = rows.flat_map(|row| row.windows(2).map(|pair| f64::from(pair[1][0] - pair[0][0]) / spacing[0]));
+    let steepest = slopes.fold(0.0, f64::min);
+    std::println!("slope {steepest:.2}");
+    assert!(steepest > -1.0 && steepest < -0.5);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 """Points that follow, displacement fields and warped images, held against closed forms and SimpleITK's own inversion and resampling."""
 
+import json
 import subprocess
 import sys
 import warnings
@@ -217,6 +218,7 @@ def run_of(simulation, folder):
     for node, (point, moved) in enumerate(zip(mesh.points, simulation.displacements)):
         lines.append(",".join(str(number) for number in (node, *point, *moved)))
     (folder / "final.csv").write_text("\n".join(lines) + "\n")
+    (folder / "summary.json").write_text(json.dumps({"status": "ok", "settled": None}))
     return folder
 
 
@@ -238,6 +240,14 @@ def test_the_command_warps_an_image(sagged, tmp_path):
     assert abs(warped - sitk.GetArrayFromImage(sagged.field(read).warp(read))).max() < 1e-4 * np.ptp(warped)
     short = command(str(run), "--image", files[0], "--out", str(tmp_path / "labels.mha"), "--labels", "--reach", "20")
     assert short.returncode == 0 and short.stderr.startswith("warning: reach 20 mm: the field may fold"), short.stderr
+    for told, words in [({"status": "inexact", "settled": None}, "the status is inexact"), ({"status": "ok", "settled": {"at_rest": False}}, "did not come to rest")]:
+        (run / "summary.json").write_text(json.dumps(told))
+        doubted = command(str(run), "--image", files[0], "--out", files[1])
+        assert doubted.returncode == 0 and doubted.stderr.startswith("warning: ") and words in doubted.stderr, doubted.stderr
+    (run / "summary.json").write_text(json.dumps({"status": "diverged", "settled": None}))
+    diverged = command(str(run), "--image", files[0], "--out", files[1])
+    assert diverged.returncode == 2 and "the run diverged" in diverged.stderr, diverged.stderr
+    (run / "summary.json").write_text(json.dumps({"status": "ok", "settled": None}))
     for given, words in [
         ((str(tmp_path), "--image", files[0], "--out", files[1]), "give a folder that `supple simulate --out` has written"),
         ((str(run), "--image", str(tmp_path / "none.mha"), "--out", files[1]), "none.mha: there is no such file"),

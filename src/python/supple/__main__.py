@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import pathlib
 import sys
 import warnings
@@ -21,6 +22,7 @@ def read_run(folder: pathlib.Path) -> tuple[Mesh, NDArray[np.float64]]:
     frames, table = sorted(folder.glob("frame_*.vtu")), folder / "final.csv"
     if not frames or not table.is_file():
         raise InputError(f"{folder}: there is no frame_*.vtu or no final.csv: give a folder that `supple simulate --out` has written")
+    _believed(folder / "summary.json")
     mesh = Mesh.read(frames[-1])
     try:
         rows = np.loadtxt(table, delimiter=",", skiprows=1, ndmin=2)
@@ -29,6 +31,20 @@ def read_run(folder: pathlib.Path) -> tuple[Mesh, NDArray[np.float64]]:
     if rows.shape != (len(mesh.points), 7) or not np.allclose(rows[:, 1:4], mesh.points, rtol=1e-6, atol=1e-9):
         raise InputError(f"{table}: not of the mesh of {frames[-1].name}: give the folder of one run")
     return mesh, rows[:, 4:]
+
+
+def _believed(summary: pathlib.Path) -> None:
+    """Refuses a run that did not end, and tells of one that is not `ok`."""
+    try:
+        told = json.loads(summary.read_text("utf-8"))
+        status, settled = str(told["status"]), told["settled"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{summary}: there is none, or it is not one of `supple simulate`: give the folder of a whole run") from None
+    if status == "diverged":
+        raise InputError(f"{summary}: the run diverged, its last displacements are those of a refused step: mend the scene first")
+    if status != "ok" or (settled is not None and not settled["at_rest"]):
+        what = f"the status is {status}" if status != "ok" else "the body did not come to rest"
+        warnings.warn(f"{summary}: {what}; see its report before you rely on the image", RuntimeWarning, stacklevel=3)
 
 
 def warp(arguments: argparse.Namespace) -> None:

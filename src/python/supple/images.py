@@ -27,8 +27,10 @@ _TRANSFORMS = (".h5", ".hdf5", ".tfm", ".txt")
 _IMAGES = (".nrrd", ".mha", ".nii.gz", ".nii", ".mhd", ".nhdr")
 # A field of more points is made on a coarser grid: 24 bytes each while an image is warped.
 _MOST_POINTS = 1 << 24
-# The slope of a field that falls off is at most 1.54 times the displacement over the reach; from 1 on it folds.
+# A field that falls off begins to at a cell of at most an eighth of the reach, or a voxel, from the tissue. Its slope is at most 1.54
+# times the displacement over the rest of the reach; from 1 on it folds.
 _STEEPEST = 1.54
+_CELL = 1 / 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,11 +119,11 @@ class Field:
 
     def warp(self, image: Any, *, labels: bool = False) -> Any:
         """The image at rest as it looks now, on its own grid, from an inverse field: interpolated linearly, of a map of labels by the nearest
-        voxel. What comes from outside the image has its least value, of labels 0."""
+        voxel. What comes from outside the image has its least value (NaN apart), of labels 0."""
         if self.kind != "inverse":
             raise InputError("an image is warped with an inverse field, this is a forward one")
         sitk = _simple_itk()
-        outside = 0.0 if labels else float(sitk.GetArrayViewFromImage(image).min())
+        outside = 0.0 if labels else float(np.fmin.reduce(sitk.GetArrayViewFromImage(image), axis=None))
         return sitk.Resample(image, image, self.transform(), sitk.sitkNearestNeighbor if labels else sitk.sitkLinear, outside)
 
 
@@ -142,13 +144,15 @@ def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, fl
             raise InputError(f"{what} {value!r}: there are {', '.join(known)}")
     if not (np.isfinite(reach) and reach >= 0.0):
         raise InputError(f"reach {reach}: a number from 0 (none) on is needed, mm")
-    if 0.0 < reach < _STEEPEST * 1e3 * largest:
+    grid, signs = Grid.of(image), _SIGNS[axes]
+    rest = _STEEPEST * 1e3 * largest
+    least = max(rest / (1.0 - _CELL), rest + max(grid.spacing))
+    if 0.0 < reach < least:
         warnings.warn(
             f"reach {reach:g} mm: the field may fold where it falls off, since nodes move by up to {1e3 * largest:.3g} mm; "
-            f"from {_STEEPEST * 1e3 * largest:.3g} mm on it does not",
+            f"from {least:.3g} mm on it does not",
             RuntimeWarning, stacklevel=3,
         )  # fmt: skip
-    grid, signs = Grid.of(image), _SIGNS[axes]
     raw, error, bytes_needed = grid._raw(signs), library.new_error(), ffi.new("size_t *")
     library.checked(lib.supple_displacement_field_size(raw, 1e-3 * reach, bytes_needed, error), error, "the grid")
     scratch, covered = library.Memory(bytes_needed[0]), ffi.new("size_t *")
