@@ -149,7 +149,7 @@ impl Pull {
 
     /// The target at a time (s), m.
     #[must_use]
-    pub(crate) fn target(&self, time: f64) -> Vec3 {
+    pub fn target(&self, time: f64) -> Vec3 {
         let [start, end] = self.times;
         if time >= end {
             return self.to.into();

@@ -88,6 +88,37 @@ fn young_comes_back_from_another_mesh_with_noise() {
     assert!((c / 5000.0 / (value / YOUNG) - 1.0).abs() < 1e-6);
 }
 
+/// Markers above a flat face: the 24 nodes nearest to one that is more than a few edges away all lie in the face.
+#[test]
+fn markers_outside_move_as_the_tissue_next_to_them() {
+    let desk = Desk::new();
+    let model = scene([6, 6, 15], "");
+    assert_eq!(desk.simulate(&model, &["--force"]).code, 0);
+    let (rows, edge) = (desk.last(), 0.02 / 6.0);
+    let at = |place: [f64; 3]| {
+        let near = |row: &[f64; 7]| (0..3).all(|axis| (row[axis + 1] - place[axis]).abs() < 1e-5);
+        let [.., x, y, z] = *rows.iter().find(|row| near(row)).unwrap();
+        [x, y, z]
+    };
+    for height in [2.0 * edge, 4.0 * edge] {
+        let mut text = "name,x_m,y_m,z_m,ux_m,uy_m,uz_m\n".to_string();
+        for (number, (j, k)) in [(1, 6), (3, 8), (5, 10), (2, 12), (4, 14)].into_iter().enumerate() {
+            let (y, z) = (f64::from(j) * edge, f64::from(k) * edge);
+            let [on, below] = [0.02, 0.02 - edge].map(|x| at([x, y, z]));
+            let u = [0, 1, 2].map(|axis| on[axis] + height / edge * (on[axis] - below[axis]));
+            text += &format!("p{number},{},{y},{z},{},{},{}\n", 0.02 + height, u[0], u[1], u[2]);
+        }
+        desk.write("points.csv", &text);
+        desk.write("model.toml", &model);
+        let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+        assert_eq!(said.code, 0, "{}", said.err);
+        assert!(said.err.contains("points are outside the mesh"), "{}", said.err);
+        let young = result(&desk)["parameters"][0]["value"].as_f64().unwrap();
+        println!("{:.1} mm above: {young:.0} of {YOUNG:.0} Pa", 1e3 * height);
+        assert!((young / YOUNG - 1.0).abs() < 0.05, "{young}");
+    }
+}
+
 #[test]
 fn damping_comes_back_from_displacements_over_time() {
     let desk = Desk::new();
@@ -110,6 +141,9 @@ fn damping_comes_back_from_displacements_over_time() {
         let (value, error) = (parameter["value"].as_f64().unwrap(), parameter["standard_error"].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{value} +- {error} of {truth}");
     }
+    // Of a point at three times, not their sum.
+    let [known, without] = ["residuals", "each_point_left_out"].map(|what| result[what]["rms_m"].as_f64().unwrap());
+    assert!(without > known && without < 1.3 * known, "{without}, with them {known}");
 }
 
 /// Springs in place of supports, a pull and an instrument that move, a start at rest: with each, what the scene has.

@@ -5,6 +5,7 @@
 //! to mass, until what is left of the way is less than asked for. Settling
 //! ([`Simulation::settle`]) takes more steps on slender bodies for distances of micrometres, which derivatives need. Units: m, s.
 
+use supple::pulls::Pull;
 use supple::simulation::{Event, Method, Settings, Simulation};
 use supple::step::{Divergence, Status};
 
@@ -21,7 +22,7 @@ const MOST_LOOKS: u32 = 5_000;
 const MOST_SPANS: u32 = 100;
 /// Steps over those at the critical step of the start, at most: tissue that collapses takes ever shorter ones.
 const MOST_STEPS: f64 = 10.0;
-/// At most so many steps to rest of tissue that relaxes.
+/// At most so many steps to rest of tissue that relaxes, or of a body that the damped motion does not bring there.
 const MOST_STEPS_TO_SETTLE: u32 = 200_000;
 
 /// Why a body did not come to rest.
@@ -63,8 +64,8 @@ impl Unrest {
 }
 
 /// Displacement (m) of each node at rest, to `metre` (m): at the worst node so much of the way is left. It begins at
-/// the displacements `from` (m), or without any. The scene's instruments are not there, and its damping, its method and
-/// its end do not matter.
+/// the displacements `from` (m), or without any. The scene's instruments are not there, and its damping and its method
+/// do not matter; targets of pulls stay where they are at its end, or that of the longest ramp.
 pub(crate) fn at_rest(setup: &Setup, from: Option<&[[f32; 3]]>, metre: f64) -> Result<Vec<[f32; 3]>, Unrest> {
     let mut resting = Resting::new(setup, from)?;
     if setup.tissues.relax() {
@@ -85,7 +86,8 @@ pub(crate) fn at_rest(setup: &Setup, from: Option<&[[f32; 3]]>, metre: f64) -> R
         }
         (latest, before) = (now, change);
     }
-    Err(Unrest::Moves(before))
+    // Where the first peak was that of a fast motion, as along a body that hangs, the damping is too much for slow ones.
+    resting.settled(metre)
 }
 
 /// The largest distance (m) between two sets of places.
@@ -94,11 +96,22 @@ pub(crate) fn largest_distance(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     a.iter().zip(b).map(square).fold(0.0, f64::max).sqrt()
 }
 
+/// The pulls with their targets where they are at a time, s.
+fn standing(setup: &Setup, time: f64, limits: &[f32]) -> Vec<Pull> {
+    let mut pulls = setup.pulls.at(time, limits);
+    for pull in &mut pulls {
+        pull.put(pull.target(time).to_array());
+    }
+    pulls
+}
+
 struct Resting<'a> {
     setup: &'a Setup,
     simulation: Simulation<'a>,
     /// The most force of each pull, N.
     limits: Vec<f32>,
+    /// When the targets of pulls are where they stay, s.
+    time: f64,
     /// Of the start, s.
     critical: f64,
     /// 1/s.
@@ -121,7 +134,8 @@ impl<'a> Resting<'a> {
         let at = |node: usize| [from.map_or([0.0; 3], |from| from[node]), [0.0; 3]];
         simulation.state_mut().view().put(start, 0.0, at);
         let limits = setup.pulls.limit(simulation.scene().view());
-        let mut resting = Self { setup, simulation, limits, critical: critical.seconds.into(), damping: 0.0 };
+        let (time, critical) = (ramp.max(setup.time.end), critical.seconds.into());
+        let mut resting = Self { setup, simulation, limits, time, critical, damping: 0.0 };
         if ramp > start {
             resting.advance(ramp)?;
         }
@@ -130,8 +144,8 @@ impl<'a> Resting<'a> {
 
     /// The displacements at rest of tissue that has had all the time to relax.
     fn settled(&mut self, metre: f64) -> Result<Vec<[f32; 3]>, Unrest> {
-        let Self { setup, simulation, limits, .. } = self;
-        let pulls = setup.pulls.at(simulation.state().time(), limits);
+        let Self { setup, simulation, limits, time, .. } = self;
+        let pulls = standing(setup, *time, limits);
         let mut loads = setup.acting(setup.loads(simulation.scene())?, &[], &pulls)?;
         let settled = simulation.settle_under(metre as f32, MOST_STEPS_TO_SETTLE, &mut loads).map_err(Problem::of)?;
         match settled.status {
@@ -143,12 +157,12 @@ impl<'a> Resting<'a> {
 
     /// Moves on by so many seconds.
     fn advance(&mut self, seconds: f64) -> Result<(), Unrest> {
-        let Self { setup, simulation, limits, critical, damping } = self;
+        let Self { setup, simulation, limits, time, critical, damping } = self;
         let most_steps = Some((MOST_STEPS * (seconds / *critical).max(MOST_STEPS)) as u32);
         if simulation.settings().damping != *damping || simulation.settings().most_steps != most_steps {
             simulation.set(Settings { method: Method::Exact, damping: *damping, most_steps, ..Settings::default() });
         }
-        let pulls = setup.pulls.at(simulation.state().time(), limits);
+        let pulls = standing(setup, *time, limits);
         let mut loads = setup.acting(setup.loads(simulation.scene())?, &[], &pulls)?;
         let until = simulation.state().time() + seconds;
         let report = simulation.advance_under(until, &mut loads, &mut |_: Event<'_>| {}).map_err(Problem::of)?;

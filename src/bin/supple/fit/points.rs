@@ -1,6 +1,7 @@
 //! Points that follow the tissue, those a little outside too: a point's displacement as weights on the displacements
 //! of nodes. Inside an element these are its linear functions; outside, as of markers on the surface, those of the
-//! linear function that fits the nearest nodes best, which one element alone would give with all of its error.
+//! linear function that fits the nodes next to the nearest one best, which one element alone would give with all of its
+//! error. Not the nodes nearest to the point: of one far from the surface they lie in it, and tell nothing of what is above.
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -8,6 +9,8 @@ use crate::scene::body::Body;
 
 /// Nodes whose linear function carries a point outside.
 const NEAREST: usize = 24;
+/// Of the extent of these nodes, squared: where they lie in one plane the function does not change across it.
+const FLAT: f64 = 1e-6;
 /// How far below zero a linear function may be in a point that counts as inside: the rounding of files.
 const ROUNDING: f64 = 1e-6;
 
@@ -27,24 +30,31 @@ impl Followed {
                 return Self { nodes: tet.iter().copied().zip(weights).collect(), outside: None };
             }
         }
-        let square = |node: u32| (0..3).map(|axis| (points[node as usize][axis] - point[axis]).powi(2)).sum::<f64>();
+        let square = |node: u32, from: [f64; 3]| {
+            (0..3).map(|axis| (points[node as usize][axis] - from[axis]).powi(2)).sum::<f64>()
+        };
         let mut nearest: Vec<u32> = (0..points.len() as u32).collect();
-        nearest.sort_by(|&a, &b| square(a).total_cmp(&square(b)));
+        let Some(foot) = nearest.iter().copied().min_by(|&a, &b| square(a, point).total_cmp(&square(b, point))) else {
+            return Self { nodes: Vec::new(), outside: None };
+        };
+        let (at_foot, distance) = (points[foot as usize], square(foot, point).sqrt());
+        nearest.sort_by(|&a, &b| square(a, at_foot).total_cmp(&square(b, at_foot)));
         nearest.truncate(NEAREST);
-        let distance = nearest.first().map(|&node| square(node).sqrt());
-        // Without units, so that the sums are of one size.
-        let size = body.diagonal();
-        let place = |node: u32| {
-            let at = points[node as usize];
-            Vector4::new(1.0, (at[0] - point[0]) / size, (at[1] - point[1]) / size, (at[2] - point[2]) / size)
+        // Without units, so that the sums are of one size, and about their middle.
+        let size = nearest.last().map_or(1.0, |&node| square(node, at_foot).sqrt().max(f64::MIN_POSITIVE));
+        let mean = [0, 1, 2]
+            .map(|axis| nearest.iter().map(|&node| points[node as usize][axis]).sum::<f64>() / nearest.len() as f64);
+        let place = |at: [f64; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] - mean[axis]) / size);
+            Vector4::new(1.0, x, y, z)
         };
-        let sum = nearest.iter().map(|&node| place(node) * place(node).transpose()).sum::<Matrix4<f64>>();
-        let nodes = match sum.try_inverse() {
-            Some(inverse) => nearest.iter().map(|&node| (node, (inverse * place(node))[0])).collect(),
-            // Nodes in one plane.
-            None => nearest.iter().take(1).map(|&node| (node, 1.0)).collect(),
-        };
-        Self { nodes, outside: distance }
+        let of_node = |node: u32| place(points[node as usize]);
+        let least = nearest.len() as f64 * FLAT;
+        let sum = nearest.iter().map(|&node| of_node(node) * of_node(node).transpose()).sum::<Matrix4<f64>>()
+            + Matrix4::from_diagonal(&Vector4::new(0.0, least, least, least));
+        let weights = sum.try_inverse().map(|inverse| inverse * place(point));
+        let weight = |node: u32| weights.map_or(0.0, |weights| weights.dot(&of_node(node)));
+        Self { nodes: nearest.into_iter().map(|node| (node, weight(node))).collect(), outside: Some(distance) }
     }
 
     /// Its displacement, m.

@@ -78,14 +78,15 @@ fn inverse_of_normal(columns: &DMatrix<f64>) -> DMatrix<f64> {
     inverse
 }
 
-/// What the numbers of a point miss if the fit does not know them, mm.
+/// How far a point is off if the fit does not know it, root of the mean over its times, mm.
 fn without(columns: &DMatrix<f64>, inverse: &DMatrix<f64>, residuals: &DVector<f64>, rows: &[usize]) -> Option<f64> {
     let of_point = columns.select_rows(rows);
     let own = DVector::from_iterator(rows.len(), rows.iter().map(|&row| residuals[row]));
     let known = DMatrix::identity(rows.len(), rows.len()) - &of_point * inverse * of_point.transpose();
     // Without the point a value could be anything.
     let is_needed = known.clone().symmetric_eigen().eigenvalues.min() < 1e-6;
-    if is_needed { None } else { Some((known.try_inverse()? * own).norm()) }
+    let times = rows.len() as f64 / 3.0;
+    if is_needed { None } else { Some((known.try_inverse()? * own).norm() / times.sqrt()) }
 }
 
 impl Statistics {
