@@ -24,6 +24,10 @@ const HALF_LIFE: f32 = 0.2;
 const REST: [f32; 2] = [0.05, 1.6];
 const PROBE: f32 = 0.04;
 const PROBE_COMPARISONS: u32 = 8;
+/// A probe comes before its time where the kinetic energy has fallen to this share of what it was at the end of the last,
+/// of the largest ones at either time, halved in so many seconds.
+const QUIETER: f64 = 0.25;
+const KINETIC_HALF_LIFE: f32 = 0.1;
 /// An instrument or the target of a pull that comes by so many tolerances in a step, and twice as fast as any in the last
 /// [`HALF_LIFE`] or so, is met by exact steps.
 const LONG_WAY: f32 = 4.0;
@@ -58,6 +62,9 @@ pub(super) struct Control {
     distance: f32,
     /// Of the fastest instrument or target, m/s, halved every [`HALF_LIFE`].
     speed: f32,
+    /// The largest kinetic energy, J, halved every [`KINETIC_HALF_LIFE`]; and at the end of the latest probe.
+    kinetic: f64,
+    kinetic_of_probe: f64,
 }
 
 /// While exact steps move the first run, the second run takes some steps now and then, to see whether they would do.
@@ -84,6 +91,8 @@ impl Control {
             rest: REST[0],
             distance: 0.0,
             speed: 0.0,
+            kinetic: 0.0,
+            kinetic_of_probe: 0.0,
         }
     }
 
@@ -120,6 +129,11 @@ impl Control {
         exceeds(way, LONG_WAY * self.tolerance) && speed > FASTER * before
     }
 
+    /// Enters the kinetic energy (J) after an exact step of so many seconds.
+    pub(super) fn enter_kinetic(&mut self, kinetic: f64, seconds: f32) {
+        self.kinetic = kinetic.max(f64::from(libm::exp2f(-seconds / KINETIC_HALF_LIFE)) * self.kinetic);
+    }
+
     /// Exact steps follow, with a probe at once; these estimates of the mean and the largest error are left behind, m.
     pub(super) fn go_exactly(&mut self, errors: [f32; 2]) {
         self.shorten(MOST, errors);
@@ -128,7 +142,8 @@ impl Control {
 
     /// Whether a probe begins with the next step.
     pub(super) fn begins_probe(&mut self) -> bool {
-        if self.probe == Probe::None && self.seconds >= self.rest {
+        let is_quieter = self.kinetic < QUIETER * self.kinetic_of_probe && self.seconds >= REST[0];
+        if self.probe == Probe::None && (is_quieter || self.seconds >= self.rest) {
             self.probe = Probe::Begins;
         }
         let begins = self.probe == Probe::Begins;
@@ -169,7 +184,7 @@ impl Control {
 
     /// Ends a probe without a result. Each is followed by a longer rest than the one before.
     pub(super) fn rest(&mut self) {
-        self.probe = Probe::None;
+        (self.probe, self.kinetic_of_probe) = (Probe::None, self.kinetic);
         let [_, most] = REST;
         self.rest = (2.0 * self.rest).min(most);
         self.changed();

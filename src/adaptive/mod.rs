@@ -338,6 +338,7 @@ impl AdaptiveView<'_> {
             taken.exact += 1;
             let seconds = state.last_step();
             control.wait(seconds);
+            control.enter_kinetic(state.energy_balance.kinetic, seconds);
             control.enter_way(loads.way(state.time() - f64::from(seconds), seconds), seconds);
             let [mean, _] = control.left_behind();
             worst = worst.worse(judged(status, mean, tolerance));
