@@ -309,13 +309,22 @@ fn product<R: Real>(part: &Part, lines: &[Part; PANEL]) -> Part {
 
 /// Replaces right sides by solutions, from the factor.
 pub(super) fn solve(band: &Band, factor: &[f32], x: &mut [&mut Row]) {
-    dispatch(Solve { band, factor, x });
+    solve_part(band, factor, x, [0; 2]);
+}
+
+/// The same of right sides that are zero before an unknown, for the solutions from another one on; what is before it is
+/// of no use.
+pub(super) fn solve_part(band: &Band, factor: &[f32], x: &mut [&mut Row], [given, asked]: [usize; 2]) {
+    dispatch(Solve { band, factor, x, first: given / PANEL, least: asked / PANEL });
 }
 
 struct Solve<'a, 'b> {
     band: &'a Band,
     factor: &'a [f32],
     x: &'a mut [&'b mut Row],
+    /// Panels.
+    first: usize,
+    least: usize,
 }
 
 #[inline(always)]
@@ -353,7 +362,7 @@ impl Kernel for Solve<'_, '_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Self { band, factor, x } = self;
+        let Self { band, factor, x, first: given, least } = self;
         let square_of = |panel: usize| {
             let mut square = [[0.0; PANEL]; PANEL];
             for (r, part) in square.iter_mut().enumerate() {
@@ -363,8 +372,8 @@ impl Kernel for Solve<'_, '_> {
             }
             square
         };
-        for panel in 0..band.panels() {
-            let (first, start) = (panel * PANEL, band.start(panel));
+        for panel in given..band.panels() {
+            let (first, start) = (panel * PANEL, band.start(panel).max(given));
             let square = square_of(panel);
             for x in x.iter_mut() {
                 let mut rows = [[0.0; PANEL]; PANEL];
@@ -386,8 +395,8 @@ impl Kernel for Solve<'_, '_> {
                 set_part_of(x, panel, product::<R>(&side, &square));
             }
         }
-        for panel in (0..band.panels()).rev() {
-            let (first, start) = (panel * PANEL, band.start(panel));
+        for panel in (least..band.panels()).rev() {
+            let (first, start) = (panel * PANEL, band.start(panel).max(least));
             let square = square_of(panel);
             for x in x.iter_mut() {
                 let side = part_of(x, panel);

@@ -3,7 +3,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::band::{Row, solve};
+use super::band::{Row, solve, solve_part};
 use super::lattice::{CoarseVectors, Lattice};
 use super::matrices::Matrices;
 use super::renewal::Renewal;
@@ -50,6 +50,30 @@ impl CoarseSpace<'_, '_> {
         solve(&self.renewal.bands.vectors, self.matrices.factor, &mut [&mut a, &mut b]);
         self.write_vectors(&a, first);
         self.write_vectors(&b, second);
+    }
+
+    /// Calls with each axis and function of a list, and the motion of that function by a unit vector (kg m) of another one along
+    /// the axis: entries of `S^-1`, 1/kg.
+    #[inline(never)]
+    pub(super) fn response(&self, of: usize, functions: &[u8], mut with: impl FnMut(usize, usize, Vec3)) {
+        let rotations = &self.matrices.frames;
+        let unit = rotations.since_stiffness(of).transpose();
+        let mut rows: [Row; 3] = [[0.0; _]; 3];
+        for (row, column) in rows.iter_mut().zip([unit.x_axis, unit.y_axis, unit.z_axis]) {
+            if let Some(place) = row.as_chunks_mut::<3>().0.get_mut(of) {
+                *place = column.to_array();
+            }
+        }
+        let least = functions.iter().copied().min().unwrap_or_default();
+        let [x, y, z] = &mut rows;
+        let part = [3 * of, 3 * usize::from(least)];
+        solve_part(&self.renewal.bands.vectors, self.matrices.factor, &mut [x, y, z], part);
+        for (axis, row) in rows.iter().enumerate() {
+            for (place, &function) in functions.iter().enumerate() {
+                let three = row.as_chunks::<3>().0.get(usize::from(function)).copied().unwrap_or_default();
+                with(axis, place, rotations.since_stiffness(function.into()) * Vec3::from(three));
+            }
+        }
     }
 
     /// Components in the frames in which `S` was computed, three for each function. Folds the vectors.

@@ -184,7 +184,7 @@ impl<T: Threads> InertiaStep<'_, T> {
         let lattice = response.map(|share| (space, share));
         let (SolverRoom { touched, local: room, sums }, force) = trial.solver_room_and_forces();
         let listed = ListedFunctions::of(touched, places, &model.lattice);
-        let local = lattice.as_ref().and_then(|(space, _)| LocalResponse::gathered(room, &listed, space, moved));
+        let local = lattice.as_ref().and_then(|(space, _)| LocalResponse::gathered(room, &listed, space));
         let (surface, scaling) = (contact.surface(), &model.scaling);
         let nodes = MovedNodes { places, inertia, square, lattice };
         let mut compliance = StepCompliance { nodes, tables, force, scaling, moved, listed, local, surface, sums };

@@ -5,9 +5,8 @@
 use glam::Vec3;
 
 use super::coarse_motion::CoarseSpace;
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
 use crate::contact::TouchedPoint;
-use crate::simd::NodeVector;
 
 /// Functions of a box of four cells.
 pub(super) const MOST_LISTED: usize = 18;
@@ -61,27 +60,17 @@ pub(super) struct LocalResponse<'a> {
 }
 
 impl<'a> LocalResponse<'a> {
-    /// Computes the matrix in `room`, with vectors to compute with. None if there are more functions than it is for.
-    pub(super) fn gathered(
-        room: &'a mut [f32],
-        listed: &ListedFunctions,
-        space: &CoarseSpace<'_, '_>,
-        vectors: &mut CoarseVectors,
-    ) -> Option<Self> {
+    /// Computes the matrix in `room`. None if there are more functions than it is for.
+    pub(super) fn gathered(room: &'a mut [f32], listed: &ListedFunctions, space: &CoarseSpace<'_, '_>) -> Option<Self> {
         let functions = listed.functions();
         let room = room.get_mut(..3 * functions.len() * STRIDE).filter(|_| functions.len() <= MOST_LISTED)?;
+        room.fill(0.0);
         for (rows, &row) in room.chunks_exact_mut(3 * STRIDE).zip(functions) {
-            for (axis, to) in rows.chunks_exact_mut(STRIDE).enumerate() {
-                vectors.fill(NodeVector::ZERO);
-                if let Some(NodeVector(vector)) = vectors.get_mut(usize::from(row)) {
-                    vector[axis % 3] = 1.0;
+            space.response(row.into(), functions, |axis, place, moved| {
+                if let Some(to) = rows.get_mut(axis * STRIDE + 3 * place..).and_then(<[f32]>::first_chunk_mut) {
+                    *to = moved.to_array();
                 }
-                space.solve(vectors);
-                to.fill(0.0);
-                for (to, &column) in to.as_chunks_mut::<3>().0.iter_mut().zip(functions) {
-                    *to = vectors.get(usize::from(column)).copied().unwrap_or_default().to_array();
-                }
-            }
+            });
         }
         Some(Self { matrix: room })
     }

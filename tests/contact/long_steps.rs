@@ -3,8 +3,10 @@
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, Touch, vectors_to_push};
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::Loads;
+use supple::material::{Element, NeoHookean, VecMaterial};
 use supple::mesh::Bar;
 use supple::scene::Support;
+use supple::simulation::{self, Simulation};
 use supple::state::NodeVector;
 use supple::step::{Cause, Status, Step};
 use supple::tled;
@@ -226,4 +228,35 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
         );
         assert!(touched > poses / 100 && refused > poses / 100);
     }
+}
+
+/// A free cube that two planes squeeze comes to rest between them, as in exact steps: 81 nodes of each side push each other.
+#[test]
+fn many_nodes_rest_between_planes() {
+    let cube = Bar { size: [0.03; 3], cells: [8; 3] };
+    let squeezed = |method: simulation::Method<'static>| {
+        let tissue = VecMaterial::one(Element::NodalStrain, NeoHookean { c: 1500.0, d: 22_500.0 }, 1000.0);
+        let body = Simulation::new(cube.points(), cube.tets(), tissue, &[]).unwrap();
+        let settings = simulation::Settings { method, damping: 20.0, ..simulation::Settings::default() };
+        let mut body = body.with(settings).meeting(false).unwrap();
+        body.gravity = [0.0, 0.0, -9.81];
+        let plane = |height: f32, up: f32| {
+            let pose = Pose::along([0.015, 0.015, height], [0.0, 0.0, up]);
+            Instrument { friction: 0.4, ..Instrument::resting(Shape::Plane, pose) }
+        };
+        let [lower, mut upper] = [plane(0.0, 1.0), plane(0.03, -1.0)];
+        upper.move_to(Pose::along([0.016, 0.015, 0.027], [0.0, 0.0, -1.0]), 0.0, 0.2);
+        body.instruments = vec![lower, upper];
+        for _ in 0..120 {
+            body.advance(1.0 / 60.0).unwrap();
+        }
+        let speed = |node: u32| length(body.state().velocity(node as usize).map(f64::from));
+        let fastest = (0..body.points().len() as u32).map(speed).fold(0.0, f64::max);
+        let force = body.touches()[0].force;
+        println!("lower plane {force:.4?} N, nodes move with up to {:.4} mm/s", 1e3 * fastest);
+        (force, fastest)
+    };
+    let (exact, _) = squeezed(simulation::Method::Exact);
+    let (force, fastest) = squeezed(simulation::Method::Long(Method::new(Cells::Suggested)));
+    assert!(fastest < 1e-3 && (force[2] / exact[2] - 1.0).abs() < 0.06, "{force:?}, exact {exact:?}");
 }

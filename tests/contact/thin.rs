@@ -88,7 +88,7 @@ fn course(method: Option<Method>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f
 #[test]
 fn a_needle_presses_and_slides_between_the_nodes() {
     let critical = Body::new(BAR, &held(), DAMPING).step.seconds();
-    for (speed, most) in [(0.005, 0.03), (0.02, 0.13)] {
+    for (speed, most) in [(0.005, 0.03), (0.02, 0.14)] {
         let (exact, inside) = course(None, 0.25 * critical, speed);
         let percent = |inside: f64| 100.0 * inside / f64::from(EDGE);
         println!("{:.0} mm/s, exact: {:.2} % of an edge inside: {exact:.4?}", 1e3 * speed, percent(inside));
