@@ -225,6 +225,12 @@ impl Lattice {
         self.cells
     }
 
+    /// Of the box around the body, m; zero without a lattice.
+    pub(super) const fn longest_side(&self) -> f32 {
+        let [x, y, z] = self.size;
+        x.max(y).max(z)
+    }
+
     /// A lattice of these cells on the box around the nodes.
     pub(super) fn new(cells: [u32; 3], layout: &Layout<'_>, inertia: &[NodeInertia]) -> Result<Self, InertiaError> {
         let mut lattice = Self::NONE;

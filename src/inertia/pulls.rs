@@ -7,7 +7,7 @@
 //! ```
 //! A node's part in `K_p` is bounded by `k |w| sum |w|`, a function's by the same of its weights. Inertia that grew with the force
 //! of a pull at its limit, as the gap closes, would feed motion. So no pull is stiffer in long steps than its most force over
-//! [`LEAST_GAP`].
+//! [`LEAST_GAP`], or less in a small body.
 
 use glam::Vec3;
 
@@ -21,8 +21,9 @@ use crate::step::{Step, Totals, Trial};
 
 /// Stiffness with which pulls are counted, over their own.
 const COUNTED: f32 = 2.0;
-/// At the most force of a pull, m.
+/// At the most force of a pull, m, and of the longest side of the body at most.
 const LEAST_GAP: f32 = 5e-4;
+const SHARE_OF_SIDE: f32 = 0.005;
 /// Growth at which `S` is computed anew, and for how many steps one that is this much too large is used.
 const GROWTH: f32 = 1.05;
 const MOST_STEPS: u32 = 12;
@@ -35,12 +36,12 @@ pub(super) fn add_pulls<M: ElementMaterial>(
     trial: &mut Trial<'_, M>,
     step: &Step,
     tables: &NodeTables<'_>,
-    places: &[LatticeNode],
+    (lattice, places): (&Lattice, &[LatticeNode]),
 ) {
     let Some(pulls) = trial.loads.pulls() else { return };
     trial.pulls.fill(NodeVector::ZERO);
     for (index, pull) in pulls.acting() {
-        let pull = &softened(pull);
+        let pull = &softened(pull, lattice);
         let force = force_of(trial, step, pulls, pull);
         if let Some(place) = trial.pulls.get_mut(index) {
             place.0 = force.extend(0.0).to_array();
@@ -60,8 +61,10 @@ pub(super) fn add_pulls<M: ElementMaterial>(
 }
 
 /// As stiff as long steps have it.
-fn softened(pull: &Pull) -> Pull {
-    Pull { stiffness: pull.stiffness.min(pull.most / LEAST_GAP), ..*pull }
+fn softened(pull: &Pull, lattice: &Lattice) -> Pull {
+    let side = lattice.longest_side();
+    let gap = if side > 0.0 { LEAST_GAP.min(SHARE_OF_SIDE * side) } else { LEAST_GAP };
+    Pull { stiffness: pull.stiffness.min(pull.most / gap), ..*pull }
 }
 
 /// The force of a pull in the step, N.
@@ -78,6 +81,7 @@ fn force_of<M: ElementMaterial>(trial: &Trial<'_, M>, step: &Step, pulls: &Pulls
 pub(super) fn add_work<M: ElementMaterial>(
     trial: &Trial<'_, M>,
     step: &Step,
+    lattice: &Lattice,
     totals: &mut Totals,
     next: impl Fn(usize) -> [f32; 4],
 ) {
@@ -88,7 +92,7 @@ pub(super) fn add_work<M: ElementMaterial>(
             let [x, y, z, _] = next(node);
             0.5 * (Vec3::new(x, y, z) + Vec3::from(last))
         });
-        totals.add_work(force_of(trial, step, pulls, &softened(pull)).dot(way));
+        totals.add_work(force_of(trial, step, pulls, &softened(pull, lattice)).dot(way));
     }
 }
 
@@ -98,7 +102,7 @@ fn stiffness_of(pulls: &Pulls<'_>, lattice: &Lattice, places: &[LatticeNode], su
         // Twice: the sum of all weights, then each one times it.
         let mut all = 0.0;
         each_weight(pulls, pull, lattice, places, |_, weight| all += weight);
-        let counted = COUNTED * softened(pull).stiffness * all;
+        let counted = COUNTED * softened(pull, lattice).stiffness * all;
         each_weight(pulls, pull, lattice, places, |function, weight| {
             if let Some(sum) = sums.get_mut(function) {
                 *sum += counted * weight;

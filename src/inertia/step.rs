@@ -119,7 +119,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
         let frames = &mut self.storage.matrices.frames;
         self.model.renewal.update_frames(frames, trial.displacement, trial.progress.steps);
         trial.add_pushes_before(self.step);
-        pulls::add_pulls(trial, self.step, &self.storage.tables, self.storage.places);
+        pulls::add_pulls(trial, self.step, &self.storage.tables, (&self.model.lattice, self.storage.places));
         let moved = self.move_lattice(trial);
         let mut totals = self.move_nodes(trial, &moved);
         // Without instruments not even its stack is used.
@@ -129,7 +129,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
         let Storage { tables, places, .. } = &self.storage;
         let next = |node| tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0;
         trial.add_work_of_given(&mut totals, next);
-        pulls::add_work(trial, self.step, &mut totals, next);
+        pulls::add_work(trial, self.step, &self.model.lattice, &mut totals, next);
         Computed { totals, extremes }
     }
 

@@ -18,7 +18,8 @@
 //!
 //! Long steps take the force half a step ahead of their start, at the velocity of the point, and raise inertia by twice
 //! the stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]); none is stiffer there than its most
-//! force over half a millimetre. Both are the exact pull where nothing moves. Learned steps refuse pulls.
+//! force over half a millimetre, or over a two-hundredth of the longest side of a body below 10 cm. Where nothing moves both
+//! are the exact pull, but for that bound. Learned steps refuse pulls.
 //!
 //! Steps keep nothing of pulls but their forces, for the host to read ([`Pulls::read`]).
 
