@@ -1280,8 +1280,8 @@ typedef struct {
      */
     float moment[3];
     /**
-     * Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the
-     * latest step.
+     * Mean of the force over the steps of the latest call that took steps, N; of steps that choose their length
+     * (supple_adaptive_advance, SUPPLE_STEPS_AUTO) that of the latest step.
      */
     float mean_force[3];
     /**

@@ -71,8 +71,8 @@ pub struct supple_touch {
     pub force: [f32; 3],
     /// Moment of the same about its position, N m.
     pub moment: [f32; 3],
-    /// Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the
-    /// latest step.
+    /// Mean of the force over the steps of the latest call that took steps, N; of steps that choose their length
+    /// (supple_adaptive_advance, SUPPLE_STEPS_AUTO) that of the latest step.
     pub mean_force: [f32; 3],
     /// Nodes that it pushes or holds, and triangles.
     pub contacts: u32,

@@ -60,6 +60,14 @@ fn bad_scenes_are_refused_in_words() {
         (with("[[force]]\nnodes = [50]\nnewton = [0.0, 1.0]\n"), "line 15:"),
         (with("[[force]]\nnodes = [50]\nnewton = [0.0, 1.0, 0.0]\nramp = -1.0\n"), "line 16: ramp is -1 s"),
         (with("[[move]]\nnodes = [50]\nmetre = [0.0, nan, 0.0]\n"), "line 15: metre holds NaN"),
+        (
+            with("[[move]]\nnodes = [2]\naxes = \"y\"\nmetre = [0.0, 0.0, 0.0]\n"),
+            "line 13: a [[fix]] holds node 2 along y already: leave it out of one of the two",
+        ),
+        (
+            with(&"[[move]]\nnodes = [50]\nmetre = [0.0, 0.0, 0.0]\n".repeat(2)),
+            "line 16: another [[move]] moves node 50 along x already: leave it out of one of the two",
+        ),
         (with("[[traction]]\nnodes = [50, 51]\npascal = [0.0, 0.0, 1.0]\n"), "no boundary triangle"),
         (
             with("[[pressure]]\nnodes = [50, 51]\npascal = 1.0\n"),

@@ -16,16 +16,28 @@ type Lists = (Vec<Support>, Vec<NodalForce>, Vec<Motion>, VecPressure);
 pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem> {
     let scene = &file.scene;
     let (mut supports, mut forces, mut motions) = (vec![], vec![], vec![]);
+    // What holds each node along each axis, to be told where two do.
+    let mut holders = vec![[""; 3]; body.local.len()];
     for at in &scene.fix {
         let axes = read_axes(file, at.get_ref().axes.as_ref())?;
-        let nodes = select(file, at, &at.get_ref().selection(), body)?;
-        supports.extend(nodes.into_iter().map(|node| Support { node, axes, moves: false }));
+        for node in select(file, at, &at.get_ref().selection(), body)? {
+            supports.push(Support { node, axes, moves: false });
+            (0..3).filter(|&axis| axes.has(axis)).for_each(|axis| holders[node as usize][axis] = "a [[fix]] holds");
+        }
     }
     for at in &scene.motion {
         let axes = read_axes(file, at.get_ref().axes.as_ref())?;
         let metre = read_vector(file, "metre", &at.get_ref().metre)?;
         let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
         for node in select(file, at, &at.get_ref().selection(), body)? {
+            for axis in (0..3).filter(|&axis| axes.has(axis)) {
+                let holder = core::mem::replace(&mut holders[node as usize][axis], "another [[move]] moves");
+                if !holder.is_empty() {
+                    let along = ["x", "y", "z"][axis];
+                    let message = format!("{holder} node {node} along {along} already: leave it out of one of the two");
+                    return Err(file.problem(at, message));
+                }
+            }
             supports.push(Support { node, axes, moves: true });
             motions.push(Motion { node, axes, metre, ramp });
         }
