@@ -63,7 +63,7 @@
     (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
 #define SUPPLE_PULLS_SIZE(pulls, nodes) \
     (SUPPLE_PULLS_FRONT + SUPPLE_ARRAY_(nodes, 8) + SUPPLE_ARRAY_(pulls, 96) + SUPPLE_ARRAY_(pulls, 16))
-#define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
+#define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (3 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
     (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,    \
@@ -2836,7 +2836,7 @@ supple_status supple_sim_advance(supple_sim *sim,
 size_t supple_settle_size(uint32_t nodes);
 
 /**
- * Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
+ * Brings a body to rest: every node to within about `metre` of where it rests under these loads.
  * Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
  * go to where they are asked for, and tissue that relaxes has had the time. Velocities are zero afterwards, and the energy balance begins with the strain energy.
  * Steps of every kind go on from there; a guard begins anew.

@@ -64,7 +64,7 @@ pub extern "C" fn supple_settle_size(nodes: u32) -> usize {
     vectors_to_settle(nodes as usize).saturating_mul(size_of::<NodeVector>())
 }
 
-/// Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
+/// Brings a body to rest: every node to within about `metre` of where it rests under these loads.
 /// Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
 /// go to where they are asked for, and tissue that relaxes has had the time. Velocities are zero afterwards, and the energy balance begins with the strain energy.
 /// Steps of every kind go on from there; a guard begins anew.

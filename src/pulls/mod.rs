@@ -194,6 +194,17 @@ impl Pull {
         force.clamp_length_max(self.most)
     }
 
+    /// Adds bounds of their stiffness to those of the nodes, N/m: of `k w w^T` a node's part is `k |w| sum |w|`.
+    pub(crate) fn add_stiffness(&self, pulls: &Pulls<'_>, rates: &mut [f32]) {
+        let nodes = pulls.nodes_of(self);
+        let all: f32 = nodes.iter().map(|pulled| pulled.weight.abs()).sum();
+        for pulled in nodes {
+            if let Some(rate) = rates.get_mut(pulled.node as usize) {
+                *rate += self.stiffness * all * pulled.weight.abs();
+            }
+        }
+    }
+
     pub(crate) fn check(&self, index: usize, nodes: usize) -> Result<(), PullError> {
         let [first, count] = self.nodes.map(|number| number as usize);
         if count == 0 || first.checked_add(count).is_none_or(|end| end > nodes) {

@@ -58,6 +58,17 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
+    /// Adds the forces of pulls on tissue that stands still where it is.
+    pub(crate) fn pull_at_rest(&mut self) {
+        let Some(pulls) = self.loads.pulls() else { return };
+        self.pulls.fill(NodeVector::ZERO);
+        for (index, pull) in pulls.acting() {
+            let gap = (pull.target(self.progress.time) - pull.unmoved()) - self.moved_mean(pulls, pull);
+            let force = pull.force(gap, Vec3::ZERO, Vec3::ZERO);
+            self.add_pull(pulls, pull, (index, force), force);
+        }
+    }
+
     /// Whether the state has room for the forces of pulls.
     pub(crate) fn has_room_for_pulls(&self) -> bool {
         self.loads.pulls().is_none_or(|pulls| pulls.pulls().len() <= self.pulls.len())

@@ -9,6 +9,7 @@
 
 mod carry_on;
 mod central_differences;
+mod conjugate;
 mod critical;
 mod displace;
 mod pace;

@@ -1,7 +1,10 @@
-//! To rest under the loads, by dynamic relaxation with kinetic damping (Day 1965; Barnes 1999, "Form finding and analysis
-//! of tension structures by dynamic relaxation"): the body moves without damping, and where its kinetic energy has
-//! passed a peak it goes back to the estimated peak and all velocities are set to zero. Nothing is to be tuned.
+//! To rest under the loads, in two ways by turns. Where no instrument touches, conjugate gradients (`conjugate.rs`) lead
+//! there, and a motion says whether they have arrived; with instruments, or where gradients lead astray (through crushed
+//! tissue, or no nearer), the motion goes all the way. Nothing is to be tuned.
 //!
+//! The motion is dynamic relaxation with kinetic damping (Day 1965; Barnes 1999, "Form finding and analysis
+//! of tension structures by dynamic relaxation"): the body moves without damping, and where its kinetic energy has
+//! passed a peak it goes back to the estimated peak and all velocities are set to zero.
 //! The shape at rest does not depend on the masses. So those of these steps are chosen so that the step is near the
 //! critical one at every node, and not only in the smallest or stiffest element: with `K <= sum_a b_a |u_a|^2`, where
 //! `b_a` (N/m) is the bound of [`super::critical_step`] with unit masses,
@@ -19,7 +22,7 @@
 //! d max(1, 8 / pi^2 (N / n)^2)
 //! ```
 //! or less: what is left of a mode after a whole swing is less than what it went. The body is at rest when two swings
-//! in a row say so.
+//! in a row say so, or gradients and the swing after them.
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
@@ -32,6 +35,7 @@ use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{CallingThread, Cause, Divergence, Status, Step, Threads, Trial};
 
+use super::conjugate::{Conjugate, Line};
 use super::critical::each_rate;
 use super::relaxation::{NodeMotion, Relaxation, go_back};
 use super::stop_in;
@@ -53,6 +57,20 @@ const MOST_HALVINGS: u32 = 8;
 /// No swing is shorter than this share of the longest one: where stiff modes alone were stopped, soft ones would never
 /// begin to move.
 const SHORTEST: u32 = 8;
+/// Steps along gradients, at least, and at most of the first longest swing.
+const LEAST_GRADIENTS: u32 = 10;
+const MOST_GRADIENTS_A_NODE: u32 = 32;
+/// They end so much nearer to rest than asked for, by their own estimate, and are looked at by a swing, so many times at most.
+const CLOSER: f32 = 0.1;
+const MOST_CHECKS: u32 = 8;
+/// What one swing alone tells is multiplied by this: measured, the truth is up to 2.4 times as far.
+const SURE: f32 = 1.5;
+/// Steps that a swing is taken to last at most by the stiffness that gradients have met.
+const MOST_LONGEST: u32 = 2000;
+/// Least volume ratio that they may lead through.
+const CRUSHED: f32 = 0.1;
+/// How far a line may lead from a shape that is not stable, over the distance from rest that is asked for: below it is rounding.
+const UNSTABLE: f32 = 10.0;
 /// A swing of a body lasts at least so many steps for each of its nodes along an edge.
 const STEPS_A_NODE: f32 = 8.0;
 
@@ -109,7 +127,7 @@ impl core::error::Error for SettleError {}
 /// Vectors of storage that [`settle`] needs for a scene of so many nodes.
 #[must_use]
 pub const fn vectors_to_settle(nodes: usize) -> usize {
-    2 * nodes + nodes.div_ceil(4)
+    3 * nodes + nodes.div_ceil(4)
 }
 
 /// Brings a body to rest: every node to within about `metre` (m) of where it rests under these loads, in at most
@@ -142,14 +160,15 @@ pub fn settle_in_parts<M: ElementMaterial>(
         return Err(SettleError::Metre { metre });
     }
     let nodes = scene.node_count();
-    let (units, begin, rates) = split(scene.inertia, storage)?;
+    let (units, begin, base, rates) = split(scene.inertia, storage)?;
     let nothing = |status| Settled { at_rest: false, remaining: f32::INFINITY, steps: 0, status };
     let room = state.capacity_for(scene.element());
     // Seconds of a constant, which can be a step's.
     let (true, Ok(step)) = (room >= nodes && nodes > 0, Step::unchecked(SECONDS, 0.0)) else {
         return Ok(nothing(Status::Mismatch { nodes, room }));
     };
-    let mut bounds = Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST };
+    let mut bounds =
+        Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST, with_pulls: false };
     let is_finite = stop_in(scene, state.reborrow()) && {
         let first = loads.of_step(&state, SECONDS, STEPS_OF_SUPPORTS);
         bounds.look(scene, &first, state.reborrow())
@@ -160,7 +179,22 @@ pub fn settle_in_parts<M: ElementMaterial>(
     let time = state.progress.time;
     copy(begin, state.displacement);
     let (swing, settled) = (Swing::first(nodes), nothing(Status::Ok));
-    let mut run = Run { step, bounds, swing, begin, halvings: 0, is_fine: false, settled };
+    let line = Line::start(scene);
+    let mut run = Run {
+        step,
+        bounds,
+        swing,
+        begin,
+        base,
+        line,
+        way: Way::Dynamic,
+        gradients: 0,
+        nearest: (f32::INFINITY, 0),
+        checks: 0,
+        halvings: 0,
+        is_fine: false,
+        settled,
+    };
     for taken in 0..most_steps.max(1) {
         let left = STEPS_OF_SUPPORTS.saturating_sub(taken).max(1);
         let of_step = loads.of_step(&state, SECONDS, left);
@@ -168,7 +202,14 @@ pub fn settle_in_parts<M: ElementMaterial>(
             // What swings before have told was of other supports.
             (run.swing.told, run.settled.remaining) = (f32::INFINITY, f32::INFINITY);
         }
-        let goes_on = run.take(scene, &of_step, state.reborrow(), threads);
+        let is_free = of_step.contact().is_none_or(|contact| contact.instruments().is_empty());
+        if run.way == Way::Dynamic && is_free && (left == 1 || of_step.motions().is_empty()) {
+            run.turn_to_gradients(state.reborrow());
+        }
+        let goes_on = match run.way {
+            Way::Gradients => run.go_along(scene, &of_step, state.reborrow(), threads, metre),
+            _ => run.take(scene, &of_step, state.reborrow(), threads, metre),
+        };
         if !goes_on || (left == 1 && run.settled.remaining < metre) {
             break;
         }
@@ -180,8 +221,8 @@ pub fn settle_in_parts<M: ElementMaterial>(
     Ok(Settled { at_rest: settled.status.is_taken() && settled.remaining < metre, ..settled })
 }
 
-/// The parts of the storage: unit masses along free axes, where a swing began, bounds.
-type Parts<'a> = (&'a [NodeVector], &'a mut [NodeVector], &'a mut [f32]);
+/// The parts of the storage: unit masses along free axes, where a swing began, forces at the base of a line, bounds.
+type Parts<'a> = (&'a [NodeVector], &'a mut [NodeVector], &'a mut [NodeVector], &'a mut [f32]);
 
 fn split<'a>(inertia: &[NodeInertia], storage: &'a mut [NodeVector]) -> Result<Parts<'a>, SettleError> {
     let (nodes, capacity) = (inertia.len(), storage.len());
@@ -190,12 +231,13 @@ fn split<'a>(inertia: &[NodeInertia], storage: &'a mut [NodeVector]) -> Result<P
         return Err(SettleError::Capacity { needed, capacity });
     }
     let (units, rest) = storage.split_at_mut(nodes.min(capacity));
-    let (begin, rates) = rest.split_at_mut(nodes.min(rest.len()));
+    let (begin, rest) = rest.split_at_mut(nodes.min(rest.len()));
+    let (base, rates) = rest.split_at_mut(nodes.min(rest.len()));
     for (unit, inertia) in units.iter_mut().zip(inertia) {
         let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
         unit.0 = [x, y, z, 1.0];
     }
-    Ok((units, begin, must_cast_slice_mut(rates).get_mut(..nodes).unwrap_or_default()))
+    Ok((units, begin, base, must_cast_slice_mut(rates).get_mut(..nodes).unwrap_or_default()))
 }
 
 /// Bounds of the stiffness at the nodes.
@@ -211,6 +253,8 @@ struct Bounds<'a> {
     between: u32,
     /// At the last look.
     extremes: Extremes<f32>,
+    /// Whether pulls count.
+    with_pulls: bool,
 }
 
 impl Bounds<'_> {
@@ -227,6 +271,9 @@ impl Bounds<'_> {
         });
         if let Some(pressure) = loads.pressure() {
             pressure.add_stiffness(progress.time, displacement, rates);
+        }
+        if let Some(pulls) = loads.pulls().filter(|_| self.with_pulls) {
+            pulls.acting().for_each(|(_, pull)| pull.add_stiffness(pulls, rates));
         }
         self.left = self.between;
         self.between = (2 * self.between).min(STEPS_BETWEEN_LOOKS);
@@ -295,9 +342,30 @@ struct Run<'a> {
     swing: Swing,
     /// Where the nodes were when it began, m.
     begin: &'a mut [NodeVector],
+    /// Forces at the base of a line, N.
+    base: &'a mut [NodeVector],
+    line: Line,
+    way: Way,
+    /// Steps along gradients.
+    gradients: u32,
+    /// The nearest to rest that they have been by their estimate, m, and after how many.
+    nearest: (f32, u32),
+    checks: u32,
     halvings: u32,
     is_fine: bool,
     settled: Settled,
+}
+
+/// How a body goes to rest.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Way {
+    /// By kinetic damping, until it may go on along gradients.
+    Dynamic,
+    Gradients,
+    /// By kinetic damping: a step along gradients was refused.
+    DynamicToTheEnd,
+    /// By a swing that is to say that the body is at rest.
+    Check,
 }
 
 impl Run<'_> {
@@ -308,8 +376,9 @@ impl Run<'_> {
         loads: &Loads<'_>,
         mut state: StateView<'_>,
         threads: &impl Threads,
+        metre: f32,
     ) -> bool {
-        let Self { step, bounds, swing, settled, begin, is_fine, .. } = self;
+        let Self { step, bounds, swing, settled, begin, is_fine, way, checks, .. } = self;
         // Not after the last step, whose forces stay.
         if bounds.left == 0 && !bounds.look(scene, loads, state.reborrow()) {
             let time = state.progress.time;
@@ -333,11 +402,91 @@ impl Run<'_> {
             go_back(scene, state.reborrow(), node, bounds.rates);
             state.progress.energy_balance.dissipated += kinetic;
             settled.remaining = swing.end(farthest(begin, state.displacement));
+            if *way == Way::Check {
+                settled.remaining = settled.remaining.max(SURE * swing.told);
+                if settled.remaining >= metre {
+                    *way = if *checks < MOST_CHECKS { Way::Dynamic } else { Way::DynamicToTheEnd };
+                }
+            }
             copy(begin, state.displacement);
             *is_fine = settled.remaining < FINE * farthest(&[], state.displacement);
         }
         bounds.enter(&extremes);
         true
+    }
+
+    fn turn_to_gradients(&mut self, state: StateView<'_>) {
+        self.way = Way::Gradients;
+        self.bounds.with_pulls = true;
+        (self.bounds.left, self.gradients, self.nearest) = (0, 0, (f32::INFINITY, 0));
+        self.line.again();
+        state.increment.fill(NodeVector::ZERO);
+        copy(self.begin, state.displacement);
+    }
+
+    /// Takes a step along a gradient. Whether others may follow.
+    fn go_along<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        mut state: StateView<'_>,
+        threads: &impl Threads,
+        metre: f32,
+    ) -> bool {
+        let Self { step, bounds, swing, settled, begin, base, line, gradients, nearest, is_fine, .. } = self;
+        let is_finite = bounds.left > 0 || bounds.look(scene, loads, state.reborrow());
+        let status = if is_finite {
+            let mut steps = Conjugate::new(line, bounds.rates, base, threads, *is_fine);
+            match Trial::begin(scene, loads, state.reborrow(), usize::MAX) {
+                Ok(trial) => trial.take(step, &mut steps),
+                Err(refused) => refused,
+            }
+        } else {
+            Status::Diverged(Divergence { time: state.progress.time, node: 0, cause: Cause::NotFinite })
+        };
+        settled.steps += 1;
+        settled.status = status;
+        let is_astray = !status.is_taken()
+            || 1.0 + state.progress.extremes.least_change < CRUSHED
+            || line.is_unstable(UNSTABLE * metre);
+        if is_astray {
+            // Back to where they began.
+            copy(state.displacement, begin);
+            state.remainder.fill(NodeVector::ZERO);
+            return self.go_on_by_motion(scene, state, f32::INFINITY);
+        }
+        *gradients += 1;
+        let remaining = if *gradients < LEAST_GRADIENTS { f32::INFINITY } else { line.remaining() };
+        *is_fine = remaining < FINE * farthest(&[], state.displacement);
+        let extremes = state.progress.extremes;
+        bounds.enter(&extremes);
+        if remaining < 0.5 * nearest.0 {
+            *nearest = (remaining, *gradients);
+        }
+        let is_stuck = *gradients > nearest.1 + (*gradients / 2).max(8 * swing.longest);
+        if is_stuck {
+            return self.go_on_by_motion(scene, state, f32::INFINITY);
+        }
+        if remaining < CLOSER * metre || *gradients >= MOST_GRADIENTS_A_NODE * swing.longest {
+            return self.go_on_by_motion(scene, state, remaining);
+        }
+        true
+    }
+
+    /// From where gradients have led, which say that so much is left to go, m.
+    fn go_on_by_motion<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        state: StateView<'_>,
+        told: f32,
+    ) -> bool {
+        let next = if told.is_finite() { Way::Check } else { Way::DynamicToTheEnd };
+        (self.way, self.bounds.with_pulls, self.bounds.left, self.checks) = (next, false, 0, self.checks + 1);
+        self.swing.told = told;
+        // Near rest stiff motions alone may be left to tell how long a swing is.
+        self.swing.longest = self.swing.longest.max(self.line.quarter(4.0 * self.bounds.share).min(MOST_LONGEST));
+        copy(self.begin, state.displacement);
+        stop_in(scene, state)
     }
 
     /// After a step that was refused: from a stop, with half the step. Whether that may help.

@@ -60,7 +60,7 @@ fn damped(simulation: &mut Simulation<'_>, seconds: f64) -> Vec<NodeVector> {
 }
 
 /// Settles it, and tells how.
-fn settled(what: &str, simulation: &mut Simulation<'_>, reference: &[NodeVector], most: f32) {
+fn settled(what: &str, simulation: &mut Simulation<'_>, reference: &[NodeVector], most: f32) -> u32 {
     let time = simulation.state().time();
     let settled = simulation.settle(TOLERANCE, 10_000).unwrap();
     let error = apart(simulation.displacements(), reference);
@@ -76,6 +76,7 @@ fn settled(what: &str, simulation: &mut Simulation<'_>, reference: &[NodeVector]
     assert_eq!((state.time(), state.last_step(), state.velocity(20)), (time, 0.0, [0.0; 3]));
     let balance = state.energy_balance();
     assert!(balance.kinetic == 0.0 && balance.work == 0.0 && balance.start > 0.0);
+    settled.steps
 }
 
 #[test]
@@ -91,7 +92,8 @@ fn it_rests_where_a_damped_motion_ends_under_gravity_and_a_force() {
         for (what, force, gravity) in [("gravity", [0.0; 3], GRAVITY), ("a force", [2e-3, 1e-3, 0.0], [0.0; 3])] {
             let reference = damped(&mut loaded(force, gravity), 4.0);
             let mut resting = loaded(force, gravity);
-            settled(&format!("{element:?}, {what}"), &mut resting, &reference, TOLERANCE);
+            // By kinetic damping alone it takes 560 to 720 under gravity.
+            assert!(settled(&format!("{element:?}, {what}"), &mut resting, &reference, TOLERANCE) < 350);
             // The supports bear the load.
             let (body, forces) = (body(), resting.state().forces());
             let borne = held(&body).iter().fold([0.0; 3], |sum, &node| {
