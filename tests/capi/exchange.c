@@ -259,7 +259,8 @@ static void pressures_and_pulls(void) {
     /* The surface is another one: no pressure until there is a new one. */
     second = set_up(second_memory, &settings);
     CHECK(supple_sim_carry_on(second, first, &settings, &error) == SUPPLE_OK);
-    CHECK(hash(pulls_memory, sizeof pulls_memory) != before);
+    /* Of a coarse bar no node of the patch goes. */
+    CHECK(PARTS == 1 || hash(pulls_memory, sizeof pulls_memory) != before);
     supple_sim *never = set_up(third_memory, &settings);
     CHECK(supple_set_pulls(objects_of(second).loads, NULL) == SUPPLE_OK);
     advance(second, FRAMES), advance(never, 1);
