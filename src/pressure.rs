@@ -28,6 +28,8 @@ use glam::Vec3;
 #[cfg(any(feature = "std", test))]
 use crate::loads::Loads;
 use crate::loads::{FARTHEST, LoadError, ramp_factor};
+#[cfg(any(feature = "std", test))]
+use crate::mesh::{faces, in_order};
 use crate::scene::AsScene;
 use crate::simd::NodeVector;
 
@@ -316,22 +318,16 @@ impl VecPressure {
     /// Takes triangles away whose nodes are no face of one of these elements any more. A surface that is open then does not
     /// fill.
     pub(crate) fn let_go_of_removed<'a>(&mut self, tets: impl Iterator<Item = &'a [u32; 4]>) {
-        let sorted = |mut nodes: [u32; 3]| {
-            nodes.sort_unstable();
-            nodes
-        };
         let mut left: std::collections::HashMap<_, _> =
-            self.triangles.iter().map(|triangle| (sorted(triangle.nodes), false)).collect();
-        for &[a, b, c, d] in tets {
-            for face in [[a, b, c], [a, b, d], [a, c, d], [b, c, d]] {
-                if let Some(is_left) = left.get_mut(&sorted(face)) {
-                    *is_left = true;
-                }
+            self.triangles.iter().map(|triangle| (in_order(triangle.nodes), false)).collect();
+        for face in tets.copied().flat_map(faces) {
+            if let Some(is_left) = left.get_mut(&in_order(face)) {
+                *is_left = true;
             }
         }
         let Self { triangles, surfaces } = self;
         triangles.retain(|triangle| {
-            let is_left = left.get(&sorted(triangle.nodes)) == Some(&true);
+            let is_left = left.get(&in_order(triangle.nodes)) == Some(&true);
             if let Some(surface) = surfaces.get_mut(triangle.surface as usize).filter(|_| !is_left) {
                 surface.bulk = 0.0;
             }

@@ -456,6 +456,12 @@ impl<'a, M> SceneView<'a, M> {
         })
     }
 
+    /// The edge of a cube of six mean elements, m.
+    pub(crate) fn edge(&self) -> f32 {
+        let volume: f32 = self.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
+        libm::cbrtf(6.0 * volume / self.element_count().max(1) as f32)
+    }
+
     /// Whether a node belongs to no element any more ([`Mesh::without`]).
     #[must_use]
     pub fn is_alone(&self, node: usize) -> bool {

@@ -51,7 +51,6 @@ impl<'a> Instrument<'a> {
         if [self.from, self.to].iter().all(Pose::is_valid) { Ok(()) } else { Err(ContactError::Pose { instrument }) }
     }
 
-    /// Where it is at `time`, s.
     /// How far it goes between two times (s), m.
     pub(crate) fn way(&self, times: [f64; 2]) -> f32 {
         if times[0] >= self.times[1] {
@@ -61,6 +60,7 @@ impl<'a> Instrument<'a> {
         from.distance(to)
     }
 
+    /// Where it is at `time`, s.
     pub(super) fn placement(&self, time: f64) -> Placement {
         let [start, end] = self.times;
         let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).clamp(0.0, 1.0) };

@@ -139,7 +139,7 @@ fn a_reach_ends_the_field() {
             let fuzzy = 2.0 * 1.8 * (2.0 * f64::from(reach) / 8.0).max(spacing);
             let kept = |way: f64| (1.0 - (way.max(0.0) / f64::from(reach)).powi(2)).max(0.0).powi(2);
             let (most, least) = (0.002 * kept(distance - fuzzy), 0.002 * kept(distance + fuzzy));
-            // Zero to within a cell.
+            // Zero to within two cells, and the point of the grid that is drawn beyond the surface.
             let ends = f64::from(reach) + 2.0 * (f64::from(reach) / 8.0).max(spacing) + spacing;
             assert!(value[1] == 0.0 || distance < ends, "{distance} of {reach}");
             let length = f64::from(value[1]);

@@ -134,7 +134,6 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
 /// Least spacing of the points of a suggested lattice, as a multiple of the edge of a cube of six elements: the coarse
 /// stiffness counts an element in one cell, and is too small for functions of which it is a large part.
 const LEAST_SPACING: f32 = 2.0;
-const ELEMENTS_OF_CUBE: f32 = 6.0;
 
 /// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
 const NODES_PER_FUNCTION: [usize; 2] = [4, 2];
@@ -156,8 +155,7 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, belo
 
 /// The largest suitable lattice with fewer than `below` functions.
 fn grid_below<M>(scene: SceneView<'_, M>, layout: &Layout<'_>, below: usize) -> Grid {
-    let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
-    let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
+    let edge = scene.edge();
     let (mut best, most) = (Grid::default(), most_functions(scene.element_count()));
     for cells in (1..64).flat_map(|parts| layout.near_cubic(parts)) {
         let Some(size) = layout.box_of(cells) else { continue };

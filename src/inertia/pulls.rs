@@ -46,17 +46,15 @@ pub(super) fn add_pulls<M: ElementMaterial>(
         if let Some(place) = trial.pulls.get_mut(index) {
             place.0 = force.extend(0.0).to_array();
         }
-        let nodes = pulls.nodes_of(pull);
-        let all: f32 = nodes.iter().map(|pulled| pulled.weight.abs()).sum();
-        for pulled in nodes {
+        pulls.each_stiffness(pull, |pulled, stiffness| {
             let node = pulled.node as usize;
             let closeness = tables.next_increment.get(rank_of(places, node)).map_or(1.0, |next| next.0[3]);
-            let bound = COUNTED * pull.stiffness * pulled.weight.abs() * all / closeness.max(f32::MIN_POSITIVE);
+            let bound = COUNTED * stiffness / closeness.max(f32::MIN_POSITIVE);
             if let Some(NodeVector([x, y, z, sum])) = trial.force.get_mut(node) {
                 let added = pulled.weight * force;
                 (*x, *y, *z, *sum) = (*x + added.x, *y + added.y, *z + added.z, *sum + bound);
             }
-        }
+        });
     }
 }
 

@@ -40,7 +40,7 @@ fn keep_single(found: &mut [[u32; 3]]) -> usize {
 }
 
 /// The nodes of a face in increasing order.
-fn in_order([a, b, c]: [u32; 3]) -> [u32; 3] {
+pub(crate) fn in_order([a, b, c]: [u32; 3]) -> [u32; 3] {
     let (low, high) = (a.min(b), a.max(b));
     [low.min(c), low.max(high.min(c)), high.max(c)]
 }

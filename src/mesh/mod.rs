@@ -12,6 +12,8 @@ pub use boundary::boundary;
 #[cfg(feature = "capi-neo-hookean")]
 pub(crate) use boundary::boundary_in;
 pub(crate) use boundary::faces;
+#[cfg(any(feature = "std", test))]
+pub(crate) use boundary::in_order;
 pub use renumbering::renumber;
 pub(crate) use renumbering::{BITS as CURVE_BITS, every_third_bit};
 

@@ -194,17 +194,6 @@ impl Pull {
         force.clamp_length_max(self.most)
     }
 
-    /// Adds bounds of their stiffness to those of the nodes, N/m: of `k w w^T` a node's part is `k |w| sum |w|`.
-    pub(crate) fn add_stiffness(&self, pulls: &Pulls<'_>, rates: &mut [f32]) {
-        let nodes = pulls.nodes_of(self);
-        let all: f32 = nodes.iter().map(|pulled| pulled.weight.abs()).sum();
-        for pulled in nodes {
-            if let Some(rate) = rates.get_mut(pulled.node as usize) {
-                *rate += self.stiffness * all * pulled.weight.abs();
-            }
-        }
-    }
-
     pub(crate) fn check(&self, index: usize, nodes: usize) -> Result<(), PullError> {
         let [first, count] = self.nodes.map(|number| number as usize);
         if count == 0 || first.checked_add(count).is_none_or(|end| end > nodes) {
@@ -310,6 +299,15 @@ impl<'a> Pulls<'a> {
     /// Those that act now, and their places.
     pub(crate) fn acting(&self) -> impl Iterator<Item = (usize, &'a Pull)> + use<'a> {
         self.pulls.iter().enumerate().filter(|(_, pull)| pull.acts())
+    }
+
+    /// Calls with each node of a pull and a bound of its stiffness, N/m: of `k w w^T` its part is `k |w| sum |w|`.
+    pub(crate) fn each_stiffness(&self, pull: &Pull, mut with: impl FnMut(&PulledNode, f32)) {
+        let nodes = self.nodes_of(pull);
+        let all: f32 = nodes.iter().map(|pulled| pulled.weight.abs()).sum();
+        for pulled in nodes {
+            with(pulled, pull.stiffness * pulled.weight.abs() * all);
+        }
     }
 
     /// The nodes of a pull.

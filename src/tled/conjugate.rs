@@ -20,7 +20,6 @@ use crate::step::{Cause, Computed, StepMethod, Threads, TotalForces, Totals, Tri
 const NEAR: f32 = 3.0;
 /// How far a step moves a node at most, as a share of the edge of a cube of six mean elements.
 const MOST_WAY: f32 = 0.25;
-const ELEMENTS_OF_CUBE: f32 = 6.0;
 /// Nodes whose products are summed in single precision.
 const AT_ONCE: usize = 64;
 
@@ -49,16 +48,15 @@ pub(super) struct Line {
 enum Next {
     /// So much farther along the line.
     On(f32),
-    /// By so much to the end of the line, where forces are `(1 - share) F + share f`, and along the next one with this `beta`.
-    Turn { rest: f32, share: f32, beta: f32 },
+    /// By so much to the end of the line, where forces are `(1 - share) F + share f` and their product over `b` is
+    /// `square`, and along the next one with this `beta`.
+    Turn { rest: f32, share: f32, square: f32, beta: f32 },
 }
 
 impl Line {
     /// A start anywhere.
     pub(super) fn start<M>(scene: SceneView<'_, M>) -> Self {
-        let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
-        let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
-        let most = MOST_WAY * edge;
+        let most = MOST_WAY * scene.edge();
         Self {
             way: 0.0,
             square: 0.0,
@@ -71,7 +69,7 @@ impl Line {
         }
     }
 
-    /// The same where the state has been moved by others.
+    /// The same where the state has been moved by others; its increments and the forces at the base are zero.
     pub(super) const fn again(&mut self) {
         (self.way, self.softest, self.remaining) = (0.0, 1.0, f32::INFINITY);
     }
@@ -93,7 +91,7 @@ impl Line {
     }
 
     /// Enters the products of the forces and the largest `|f| / b`.
-    fn judge(&mut self, [.., first, last]: [f64; 5], farthest: f32) {
+    fn judge(&mut self, [.., first, last]: [f64; 4], farthest: f32) {
         if self.way == 0.0 || farthest == 0.0 {
             self.remaining = if farthest == 0.0 { 0.0 } else { f32::INFINITY };
             return;
@@ -106,10 +104,10 @@ impl Line {
         self.unstable = if stiffness > 0.0 { 0.0 } else { self.way * self.farthest };
     }
 
-    /// From the products of the forces: `F.F / b`, `F.f / b`, `f.f / b`, `F.p`, `f.p`.
-    fn next(&self, [_, mixed, new, first, last]: [f64; 5]) -> Next {
+    /// From the products of the forces: `F.f / b`, `f.f / b`, `F.p`, `f.p`.
+    fn next(&self, [mixed, new, first, last]: [f64; 4]) -> Next {
         if self.way == 0.0 {
-            return Next::Turn { rest: 0.0, share: 1.0, beta: 0.0 };
+            return Next::Turn { rest: 0.0, share: 1.0, square: new as f32, beta: 0.0 };
         }
         if self.farthest == 0.0 {
             return Next::On(0.0);
@@ -126,7 +124,8 @@ impl Line {
         let own = (1.0 - share) * (1.0 - share) * old + 2.0 * share * (1.0 - share) * mixed + share * share * new;
         let with_old = (1.0 - share) * old + share * mixed;
         let beta = ((own - with_old) / old).max(0.0);
-        Next::Turn { rest: rest as f32, share: share as f32, beta: if beta.is_finite() { beta as f32 } else { 0.0 } }
+        let beta = if beta.is_finite() { beta as f32 } else { 0.0 };
+        Next::Turn { rest: rest as f32, share: share as f32, square: own.max(0.0) as f32, beta }
     }
 }
 
@@ -141,7 +140,6 @@ pub(super) struct Conjugate<'a, T> {
     /// Whether motions are so small that rounding of the displacements matters.
     pub(super) is_fine: bool,
     next: Next,
-    square: f32,
 }
 
 impl<'a, T> Conjugate<'a, T> {
@@ -152,17 +150,17 @@ impl<'a, T> Conjugate<'a, T> {
         threads: &'a T,
         is_fine: bool,
     ) -> Self {
-        Self { line, rates, base, threads, is_fine, next: Next::On(0.0), square: 0.0 }
+        Self { line, rates, base, threads, is_fine, next: Next::On(0.0) }
     }
 
     /// The products of the forces, and the largest `|f| / b`.
-    fn products<M: ElementMaterial>(&self, trial: &Trial<'_, M>) -> ([f64; 5], f32) {
-        let (mut sums, mut farthest) = ([0.0; 5], 0.0f32);
+    fn products<M: ElementMaterial>(&self, trial: &Trial<'_, M>) -> ([f64; 4], f32) {
+        let (mut sums, mut farthest) = ([0.0; 4], 0.0f32);
         let Trial { scene, force, increment, .. } = trial;
         let nodes = scene.inertia.chunks(AT_ONCE).zip(self.rates.chunks(AT_ONCE));
         let vectors = force.chunks(AT_ONCE).zip(self.base.chunks(AT_ONCE)).zip(increment.chunks(AT_ONCE));
         for ((inertia, rates), ((forces, bases), directions)) in nodes.zip(vectors) {
-            let mut of_these = [Vec4::ZERO; 5];
+            let mut of_these = [Vec4::ZERO; 4];
             let nodes = inertia.iter().zip(rates).zip(forces.iter().zip(bases).zip(directions));
             for ((inertia, rate), ((force, base), direction)) in nodes {
                 let axes = inertia.free_axes();
@@ -171,7 +169,7 @@ impl<'a, T> Conjugate<'a, T> {
                 let over = 1.0 / rate;
                 let (old, new) = (over * base, over * force);
                 farthest = farthest.max(new.length_squared());
-                let products = [old * base, old * force, new * force, base * direction, force * direction];
+                let products = [old * force, new * force, base * direction, force * direction];
                 of_these.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
             }
             for (sum, of_these) in sums.iter_mut().zip(of_these) {
@@ -196,14 +194,6 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Conjugate<'_, T> {
         }
         self.next = self.line.next(products);
         self.line.judge(products, farthest);
-        let [.., new, _, _] = products;
-        self.square = new as f32;
-        if let Next::Turn { share, .. } = self.next {
-            let [_, mixed, new, ..] = products;
-            let (share, old) = (f64::from(share), f64::from(self.line.square));
-            let own = (1.0 - share) * (1.0 - share) * old + 2.0 * share * (1.0 - share) * mixed + share * share * new;
-            self.square = if self.line.way == 0.0 { new as f32 } else { own.max(0.0) as f32 };
-        }
         Computed { totals: Totals::NONE, extremes }
     }
 
@@ -223,39 +213,37 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Conjugate<'_, T> {
         let Trial { scene, displacement, remainder, increment, force, .. } = trial;
         let (rest, turn) = match self.next {
             Next::On(rest) => (rest, None),
-            Next::Turn { rest, share, beta } => (rest, Some((share, beta))),
+            Next::Turn { rest, share, square, beta } => (rest, Some((share, square, beta))),
         };
-        let is_start = self.line.way == 0.0;
         let (mut farthest, mut weight) = (0.0f32, 0.0f64);
         let rows = displacement.iter_mut().zip(&mut **remainder).zip(&mut **increment);
         let of_nodes = scene.inertia.iter().zip(self.rates).zip(&mut *self.base).zip(&**force);
         for (((at, left), direction), (((inertia, rate), base), force)) in rows.zip(of_nodes) {
             let free = inertia.free_axes();
-            let along = if is_start { Vec4::ZERO } else { Vec4::select(free, Vec4::from(direction.0), Vec4::ZERO) };
+            let along = Vec4::select(free, Vec4::from(direction.0), Vec4::ZERO);
             if rest != 0.0 {
                 [at.0, left.0] = moved(Vec4::from(at.0), left.0.into(), rest * along).map(|vector| vector.to_array());
             }
-            let Some((share, beta)) = turn else { continue };
+            let Some((share, _, beta)) = turn else { continue };
             let force = Vec4::select(free, Vec4::from(force.0), Vec4::ZERO);
-            let old = if is_start { Vec4::ZERO } else { Vec4::from(base.0) };
-            let new = (1.0 - share) * old + share * force;
+            let new = (1.0 - share) * Vec4::from(base.0) + share * force;
             let along = beta * along + new / *rate;
             (base.0, direction.0) = (new.to_array(), along.to_array());
             farthest = farthest.max(along.truncate().length_squared());
             weight += f64::from(rate * along.truncate().length_squared());
         }
-        if turn.is_none() {
+        let Some((_, square, _)) = turn else {
             self.line.way += rest;
             return;
-        }
+        };
         farthest = libm::sqrtf(farthest);
         // As far as the last line went; from a start as far as no stiffness forbids.
-        let guess = if is_start { 1.0 } else { self.line.way + rest };
+        let guess = if self.line.way == 0.0 { 1.0 } else { self.line.way + rest };
         let way = guess.min(self.line.most / farthest.max(f32::MIN_POSITIVE));
         for ((at, left), direction) in displacement.iter_mut().zip(&mut **remainder).zip(&**increment) {
             let step = way * Vec4::from(direction.0);
             [at.0, left.0] = moved(Vec4::from(at.0), left.0.into(), step).map(|vector| vector.to_array());
         }
-        *self.line = Line { way, square: self.square, farthest, weight, ..*self.line };
+        *self.line = Line { way, square, farthest, weight, ..*self.line };
     }
 }

@@ -57,13 +57,13 @@ const MOST_HALVINGS: u32 = 8;
 /// No swing is shorter than this share of the longest one: where stiff modes alone were stopped, soft ones would never
 /// begin to move.
 const SHORTEST: u32 = 8;
-/// Steps along gradients, at least, and at most of the first longest swing.
+/// Steps along gradients, at least, and at most for each step of the longest swing.
 const LEAST_GRADIENTS: u32 = 10;
-const MOST_GRADIENTS_A_NODE: u32 = 32;
+const MOST_GRADIENTS: u32 = 32;
 /// They end so much nearer to rest than asked for, by their own estimate, and are looked at by a swing, so many times at most.
 const CLOSER: f32 = 0.1;
 const MOST_CHECKS: u32 = 8;
-/// What one swing alone tells is multiplied by this: measured, the truth is up to 2.4 times as far.
+/// What one swing alone tells is multiplied by this.
 const SURE: f32 = 1.5;
 /// Steps that a swing is taken to last at most by the stiffness that gradients have met.
 const MOST_LONGEST: u32 = 2000;
@@ -167,11 +167,10 @@ pub fn settle_in_parts<M: ElementMaterial>(
     let (true, Ok(step)) = (room >= nodes && nodes > 0, Step::unchecked(SECONDS, 0.0)) else {
         return Ok(nothing(Status::Mismatch { nodes, room }));
     };
-    let mut bounds =
-        Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST, with_pulls: false };
+    let mut bounds = Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST };
     let is_finite = stop_in(scene, state.reborrow()) && {
         let first = loads.of_step(&state, SECONDS, STEPS_OF_SUPPORTS);
-        bounds.look(scene, &first, state.reborrow())
+        bounds.look(scene, &first, state.reborrow(), false)
     };
     if !is_finite {
         return Err(SettleError::NotFinite);
@@ -181,6 +180,7 @@ pub fn settle_in_parts<M: ElementMaterial>(
     let (swing, settled) = (Swing::first(nodes), nothing(Status::Ok));
     let line = Line::start(scene);
     let mut run = Run {
+        metre,
         step,
         bounds,
         swing,
@@ -207,8 +207,8 @@ pub fn settle_in_parts<M: ElementMaterial>(
             run.turn_to_gradients(state.reborrow());
         }
         let goes_on = match run.way {
-            Way::Gradients => run.go_along(scene, &of_step, state.reborrow(), threads, metre),
-            _ => run.take(scene, &of_step, state.reborrow(), threads, metre),
+            Way::Gradients => run.go_along(scene, &of_step, state.reborrow(), threads),
+            _ => run.take(scene, &of_step, state.reborrow(), threads),
         };
         if !goes_on || (left == 1 && run.settled.remaining < metre) {
             break;
@@ -253,13 +253,17 @@ struct Bounds<'a> {
     between: u32,
     /// At the last look.
     extremes: Extremes<f32>,
-    /// Whether pulls count.
-    with_pulls: bool,
 }
 
 impl Bounds<'_> {
-    /// Computes them for the state. Whether they are numbers.
-    fn look<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, loads: &Loads<'_>, state: StateView<'_>) -> bool {
+    /// Computes them for the state, with or without those of pulls. Whether they are numbers.
+    fn look<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        with_pulls: bool,
+    ) -> bool {
         let StateView { displacement, increment, force, volume, progress, .. } = state;
         let (rates, mut finite) = (&mut *self.rates, true);
         let vectors = [&mut *displacement, increment, force];
@@ -272,8 +276,14 @@ impl Bounds<'_> {
         if let Some(pressure) = loads.pressure() {
             pressure.add_stiffness(progress.time, displacement, rates);
         }
-        if let Some(pulls) = loads.pulls().filter(|_| self.with_pulls) {
-            pulls.acting().for_each(|(_, pull)| pull.add_stiffness(pulls, rates));
+        if let Some(pulls) = loads.pulls().filter(|_| with_pulls) {
+            for (_, pull) in pulls.acting() {
+                pulls.each_stiffness(pull, |pulled, stiffness| {
+                    if let Some(rate) = rates.get_mut(pulled.node as usize) {
+                        *rate += stiffness;
+                    }
+                });
+            }
         }
         self.left = self.between;
         self.between = (2 * self.between).min(STEPS_BETWEEN_LOOKS);
@@ -337,6 +347,8 @@ impl Swing {
 
 /// A body on its way to rest.
 struct Run<'a> {
+    /// How near to rest it is to come, m.
+    metre: f32,
     step: Step,
     bounds: Bounds<'a>,
     swing: Swing,
@@ -376,11 +388,10 @@ impl Run<'_> {
         loads: &Loads<'_>,
         mut state: StateView<'_>,
         threads: &impl Threads,
-        metre: f32,
     ) -> bool {
-        let Self { step, bounds, swing, settled, begin, is_fine, way, checks, .. } = self;
+        let Self { step, bounds, swing, settled, begin, is_fine, way, checks, metre, .. } = self;
         // Not after the last step, whose forces stay.
-        if bounds.left == 0 && !bounds.look(scene, loads, state.reborrow()) {
+        if bounds.left == 0 && !bounds.look(scene, loads, state.reborrow(), false) {
             let time = state.progress.time;
             settled.status = Status::Diverged(Divergence { time, node: 0, cause: Cause::NotFinite });
             return false;
@@ -404,7 +415,7 @@ impl Run<'_> {
             settled.remaining = swing.end(farthest(begin, state.displacement));
             if *way == Way::Check {
                 settled.remaining = settled.remaining.max(SURE * swing.told);
-                if settled.remaining >= metre {
+                if settled.remaining >= *metre {
                     *way = if *checks < MOST_CHECKS { Way::Dynamic } else { Way::DynamicToTheEnd };
                 }
             }
@@ -417,7 +428,6 @@ impl Run<'_> {
 
     fn turn_to_gradients(&mut self, state: StateView<'_>) {
         self.way = Way::Gradients;
-        self.bounds.with_pulls = true;
         (self.bounds.left, self.gradients, self.nearest) = (0, 0, (f32::INFINITY, 0));
         self.line.again();
         state.increment.fill(NodeVector::ZERO);
@@ -431,10 +441,9 @@ impl Run<'_> {
         loads: &Loads<'_>,
         mut state: StateView<'_>,
         threads: &impl Threads,
-        metre: f32,
     ) -> bool {
-        let Self { step, bounds, swing, settled, begin, base, line, gradients, nearest, is_fine, .. } = self;
-        let is_finite = bounds.left > 0 || bounds.look(scene, loads, state.reborrow());
+        let Self { step, bounds, swing, settled, begin, base, line, gradients, nearest, is_fine, metre, .. } = self;
+        let is_finite = bounds.left > 0 || bounds.look(scene, loads, state.reborrow(), true);
         let status = if is_finite {
             let mut steps = Conjugate::new(line, bounds.rates, base, threads, *is_fine);
             match Trial::begin(scene, loads, state.reborrow(), usize::MAX) {
@@ -448,7 +457,7 @@ impl Run<'_> {
         settled.status = status;
         let is_astray = !status.is_taken()
             || 1.0 + state.progress.extremes.least_change < CRUSHED
-            || line.is_unstable(UNSTABLE * metre);
+            || line.is_unstable(UNSTABLE * *metre);
         if is_astray {
             // Back to where they began.
             copy(state.displacement, begin);
@@ -467,7 +476,7 @@ impl Run<'_> {
         if is_stuck {
             return self.go_on_by_motion(scene, state, f32::INFINITY);
         }
-        if remaining < CLOSER * metre || *gradients >= MOST_GRADIENTS_A_NODE * swing.longest {
+        if remaining < CLOSER * *metre || *gradients >= MOST_GRADIENTS * swing.longest {
             return self.go_on_by_motion(scene, state, remaining);
         }
         true
@@ -481,7 +490,7 @@ impl Run<'_> {
         told: f32,
     ) -> bool {
         let next = if told.is_finite() { Way::Check } else { Way::DynamicToTheEnd };
-        (self.way, self.bounds.with_pulls, self.bounds.left, self.checks) = (next, false, 0, self.checks + 1);
+        (self.way, self.bounds.left, self.checks) = (next, 0, self.checks + 1);
         self.swing.told = told;
         // Near rest stiff motions alone may be left to tell how long a swing is.
         self.swing.longest = self.swing.longest.max(self.line.quarter(4.0 * self.bounds.share).min(MOST_LONGEST));
@@ -508,7 +517,7 @@ impl Run<'_> {
         self.bounds.between = 1;
         self.swing = Swing { steps: 0, kinetic: 0.0, told: f32::INFINITY, ..self.swing };
         copy(self.begin, state.displacement);
-        self.bounds.look(scene, loads, state)
+        self.bounds.look(scene, loads, state, false)
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Exact steps without damping until the kinetic energy has passed its first peak, which is a quarter of a period after
 //! the start: `omega = pi / (2 t)`. From there on with critical damping of that frequency, `mu = 2 omega` in proportion
-//! to mass, until what is left of the way is less than asked for. Settling
-//! ([`Simulation::settle`]) takes more steps on slender bodies for distances of micrometres, which derivatives need. Units: m, s.
+//! to mass, until what is left of the way is less than asked for. Where that
+//! does not come to rest, and where tissue relaxes, [`Simulation::settle`] does. Units: m, s.
 
 use supple::pulls::Pull;
 use supple::simulation::{Event, Method, Settings, Simulation};
