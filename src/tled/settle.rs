@@ -431,6 +431,7 @@ impl Run<'_> {
         (self.bounds.left, self.gradients, self.nearest) = (0, 0, (f32::INFINITY, 0));
         self.line.again();
         state.increment.fill(NodeVector::ZERO);
+        self.base.fill(NodeVector::ZERO);
         copy(self.begin, state.displacement);
     }
 

@@ -223,6 +223,20 @@ fn hostile_values_are_refused_in_words() {
 }
 
 #[test]
+fn what_the_storage_held_before_changes_no_bit() {
+    let settle = |held_before: f32| {
+        let mut simulation = bar(Element::NodalStrain, true);
+        let (scene, state) = simulation.parts_mut();
+        let mut loads = supple::loads::Loads::new(scene, GRAVITY, &[], &[]).unwrap();
+        let mut room = vec![bytemuck::cast([held_before; 4]); tled::vectors_to_settle(scene.node_count())];
+        let settled = tled::settle(scene, &mut loads, state, TOLERANCE, 10_000, &mut room).unwrap();
+        assert!(settled.at_rest);
+        (settled.steps, bits(simulation.state()))
+    };
+    assert_eq!(settle(f32::NAN), settle(0.0));
+}
+
+#[test]
 fn threads_change_no_bit() {
     let body = Body::bar([0.1, 0.1, 0.22], [10, 10, 22]);
     let fixed: Vec<_> = held(&body).into_iter().map(Support::fixed).collect();
