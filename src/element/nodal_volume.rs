@@ -171,7 +171,8 @@ fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
         let mut buffer = S::buffer::<N>();
         let rows = nodes_of(tiles.each_ref());
         let inside = sums.checked::<R, N>(rows);
-        let nodes = inside.or_else(|| TileNodes::in_range::<R>(rows, 0, displacement.count()));
+        let readable = inside.filter(|nodes| nodes.end() <= displacement.count());
+        let nodes = readable.or_else(|| TileNodes::in_range::<R>(rows, 0, displacement.count()));
         let nodes = nodes.unwrap_or(TileNodes::<N>::ALL_ZERO);
         for first in (0..TILE).step_by(R::COUNT) {
             let mut at = [[R::splat(0.0); 3]; N];

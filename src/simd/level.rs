@@ -8,12 +8,12 @@ use core::sync::atomic::{AtomicU8, Ordering};
 #[cfg(not(target_arch = "x86_64"))]
 use super::Portable;
 use super::Real;
-#[cfg(target_arch = "x86_64")]
-use super::{Pair, avx2::Avx2, avx512::Avx512, sse2::Sse2};
 #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
 use super::{Pair, neon::Neon};
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 use super::{Pair, simd128::Simd128};
+#[cfg(target_arch = "x86_64")]
+use super::{avx2::Avx2, avx512::Avx512, sse2::Sse2};
 
 /// A set of vector instructions.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -128,7 +128,7 @@ impl Level {
 
 /// The vectors of [`Level::Portable`].
 #[cfg(target_arch = "x86_64")]
-pub(crate) type Baseline = Pair<Sse2>;
+pub(crate) type Baseline = Sse2;
 /// The vectors of [`Level::Portable`].
 #[cfg(not(target_arch = "x86_64"))]
 pub(crate) type Baseline = Portable<8>;

@@ -12,7 +12,7 @@ pub(crate) struct ScatterNumbers<'a> {
     first: usize,
 }
 
-/// Scalar code collects here what goes to the `N` corners of eight elements, as in [`super::ScatterBuffer`].
+/// Scalar code and vectors of four collect here what goes to the `N` corners of eight elements, as in [`super::ScatterBuffer`].
 pub(crate) struct NumberBuffer<const N: usize>([[f32; SCATTER_WIDTH]; N]);
 
 impl<const N: usize> NumberBuffer<N> {
@@ -26,14 +26,18 @@ impl<'a> ScatterNumbers<'a> {
         Self { numbers, first }
     }
 
-    /// The nodes of a tile, if all of them have a number here.
+    /// The nodes of a tile, if all of them have a number here, as [`super::Scatter::checked`].
     #[inline(always)]
     pub(crate) fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
+        if R::COUNT < SCATTER_WIDTH {
+            return Some(TileNodes::checked_at_access(rows));
+        }
         TileNodes::in_range::<R>(rows, self.first, self.numbers.len())
     }
 
     /// Adds for each corner the value in lane `l` to the number of the node in place `first + l`; nothing if the nodes
-    /// have not been checked by [`ScatterNumbers::checked`]. Scalar code has to call this for all places in order.
+    /// have not been checked by [`ScatterNumbers::checked`]. Vectors of fewer than eight have to call this for all places in
+    /// order.
     #[inline(always)]
     pub(crate) fn add_corners<R: Real, const N: usize>(
         &mut self,
@@ -42,12 +46,15 @@ impl<'a> ScatterNumbers<'a> {
         values: [R; N],
         buffer: &mut NumberBuffer<N>,
     ) {
-        if R::COUNT == 1 {
+        if R::COUNT < SCATTER_WIDTH {
+            let place = first % SCATTER_WIDTH;
             for (buffered, value) in buffer.0.iter_mut().zip(values) {
-                buffered[first % SCATTER_WIDTH] = value.lane(0);
+                for lane in 0..R::COUNT {
+                    buffered[(place + lane) % SCATTER_WIDTH] = value.lane(lane);
+                }
             }
-            if first % SCATTER_WIDTH == SCATTER_WIDTH - 1 {
-                self.add_buffered(nodes, first - first % SCATTER_WIDTH, buffer);
+            if place + R::COUNT == SCATTER_WIDTH {
+                self.add_buffered(nodes, first - place, buffer);
             }
             return;
         }

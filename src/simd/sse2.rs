@@ -1,6 +1,5 @@
-//! Four float32 values in one SSE register. Every x86-64 processor has SSE2; the registers are used in [pairs](Pair) of
-//! eight values, as at other levels, so that sums keep their order. [`Portable`](super::Portable) would give the same
-//! bits, but each of its operations is a loop that the compiler has to unroll, which takes it minutes in long kernels.
+//! Four float32 values in one SSE register. Every x86-64 processor has SSE2. [`Portable`](super::Portable) would give the
+//! same bits, but each of its operations is a loop that the compiler has to unroll, which takes it minutes in long kernels.
 
 #![allow(unsafe_code)] // Intrinsics are unsafe in functions that do not enable their feature.
 

@@ -165,15 +165,26 @@ impl<'a, const N: usize> TileNodes<'a, N> {
     /// Node 0 in all places.
     pub(crate) const ALL_ZERO: Self = Self { rows: [&[0; TILE]; N], first: 0, count: 1 };
 
+    /// Nodes that each access checks: their range is one that no table has, so that vectorised accesses refuse it.
+    #[inline(always)]
+    pub(super) const fn checked_at_access(rows: [&'a [u32; TILE]; N]) -> Self {
+        Self { rows, first: 0, count: usize::MAX }
+    }
+
     /// The nodes, if all are in the range of `count` nodes from `first` on. Scalar code checks each node at its access
     /// instead.
     #[inline(always)]
     pub(crate) fn in_range<R: Real>(rows: [&'a [u32; TILE]; N], first: usize, count: usize) -> Option<Self> {
         if R::COUNT == 1 {
-            // A range that no table has: vectorised accesses refuse it.
-            return Some(Self { rows, first: 0, count: usize::MAX });
+            return Some(Self::checked_at_access(rows));
         }
         if all_in_range::<R, N>(rows, first, count) { Some(Self { rows, first, count }) } else { None }
+    }
+
+    /// The first node after the range.
+    #[inline(always)]
+    pub(crate) const fn end(&self) -> usize {
+        self.first + self.count
     }
 
     /// The node in row `corner` and `lane`.
@@ -221,7 +232,7 @@ impl<'a> Gather<'a> {
         if R::COUNT == 1 {
             return self.0.get(nodes.at(corner, first)).copied().unwrap_or_default().0.map(R::splat);
         }
-        if nodes.first + nodes.count > self.0.len() {
+        if nodes.end() > self.0.len() {
             return [R::splat(0.0); 4];
         }
         R::from_rows(|lane| {
@@ -238,8 +249,8 @@ impl<'a> Gather<'a> {
 /// whatever the width of a vector.
 pub(crate) const SCATTER_WIDTH: usize = 8;
 
-/// Scalar code collects here what goes to the `N` corners of eight elements, and then adds it in the order of
-/// vectorised code.
+/// Scalar code and vectors of four collect here what goes to the `N` corners of eight elements, and then add it in the order
+/// of longer vectors.
 pub(crate) struct ScatterBuffer<const N: usize>([[[f32; 4]; SCATTER_WIDTH]; N]);
 
 impl<const N: usize> ScatterBuffer<N> {
@@ -271,15 +282,18 @@ impl<'a> Scatter<'a> {
         Scatter { vectors: self.vectors, first: self.first }
     }
 
-    /// The nodes of a tile, if all of them have a vector here.
+    /// The nodes of a tile, if all of them have a vector here. Vectors of fewer than eight check each node at its access.
     #[inline(always)]
     pub(crate) fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
+        if R::COUNT < SCATTER_WIDTH {
+            return Some(TileNodes::checked_at_access(rows));
+        }
         TileNodes::in_range::<R>(rows, self.first, self.vectors.len())
     }
 
     /// Adds for each corner the components in lane `l` to the vector of the node in place `first + l`, in the order of
-    /// [`Real::corners_to_rows`]; nothing if the nodes have not been checked by [`Scatter::checked`]. Scalar code has
-    /// to call this for all places in order.
+    /// [`Real::corners_to_rows`]; nothing if the nodes have not been checked by [`Scatter::checked`]. Vectors of fewer
+    /// than eight have to call this for all places in order.
     #[inline(always)]
     pub(crate) fn add_corners<R: Real, const N: usize>(
         &mut self,
@@ -288,12 +302,13 @@ impl<'a> Scatter<'a> {
         values: [[R; 4]; N],
         buffer: &mut ScatterBuffer<N>,
     ) {
-        if R::COUNT == 1 {
+        if R::COUNT < SCATTER_WIDTH {
+            let place = first % SCATTER_WIDTH;
             for (buffered, values) in buffer.0.iter_mut().zip(values) {
-                R::to_rows(values, |_, row| buffered[first % SCATTER_WIDTH] = row);
+                R::to_rows(values, |lane, row| buffered[(place + lane) % SCATTER_WIDTH] = row);
             }
-            if first % SCATTER_WIDTH == SCATTER_WIDTH - 1 {
-                self.add_buffered(nodes, first - first % SCATTER_WIDTH, buffer);
+            if place + R::COUNT == SCATTER_WIDTH {
+                self.add_buffered(nodes, first - place, buffer);
             }
             return;
         }
