@@ -37,8 +37,10 @@ pub(super) struct Line {
     /// The least ratio of `p.K p` and `p.b p` of the lines so far, and that of this one.
     softest: f32,
     weight: f64,
-    /// See [`Line::remaining`].
-    remaining: f32,
+    /// The largest `|f| / b`, m.
+    gradient: f32,
+    /// Whether the last line had a minimum.
+    ends: bool,
     /// How far a line went on that its forces helped along, m, at the farthest node; zero if the last one was none.
     unstable: f32,
 }
@@ -64,20 +66,26 @@ impl Line {
             most,
             softest: 1.0,
             weight: 0.0,
-            remaining: f32::INFINITY,
+            gradient: f32::INFINITY,
+            ends: false,
             unstable: 0.0,
         }
     }
 
     /// The same where the state has been moved by others; its increments and the forces at the base are zero.
     pub(super) const fn again(&mut self) {
-        (self.way, self.softest, self.remaining) = (0.0, 1.0, f32::INFINITY);
+        (self.way, self.gradient, self.ends) = (0.0, f32::INFINITY, false);
+    }
+
+    /// The largest `|f| / b` of a node, m.
+    pub(super) const fn gradient(&self) -> f32 {
+        self.gradient
     }
 
     /// About how far from rest the farthest node is, m: the largest `|f| / b`, over the least stiffness of a line, in parts of
     /// `b`. Infinite where the last line was none of a minimum.
-    pub(super) const fn remaining(&self) -> f32 {
-        self.remaining
+    pub(super) fn remaining(&self) -> f32 {
+        if self.ends || self.gradient == 0.0 { self.gradient / self.softest } else { f32::INFINITY }
     }
 
     /// Whether the last line, farther than this (m), led down from a shape in which the body does not stay.
@@ -92,16 +100,16 @@ impl Line {
 
     /// Enters the products of the forces and the largest `|f| / b`.
     fn judge(&mut self, [.., first, last]: [f64; 4], farthest: f32) {
+        (self.gradient, self.ends) = (farthest, false);
         if self.way == 0.0 || farthest == 0.0 {
-            self.remaining = if farthest == 0.0 { 0.0 } else { f32::INFINITY };
             return;
         }
         let stiffness = ((first - last) / (f64::from(self.way) * self.weight)) as f32;
-        if stiffness > 0.0 {
+        self.ends = stiffness > 0.0;
+        if self.ends {
             self.softest = self.softest.min(stiffness);
         }
-        self.remaining = if stiffness > 0.0 { farthest / self.softest } else { f32::INFINITY };
-        self.unstable = if stiffness > 0.0 { 0.0 } else { self.way * self.farthest };
+        self.unstable = if self.ends { 0.0 } else { self.way * self.farthest };
     }
 
     /// From the products of the forces: `F.f / b`, `f.f / b`, `F.p`, `f.p`.

@@ -50,15 +50,18 @@ const STEPS_OF_SUPPORTS: u32 = 64;
 const STEPS_BETWEEN_LOOKS: u32 = 128;
 /// Relative fall of the least volume ratio, or rise of the saturation, after which they are looked at at once.
 const SQUEEZE: f32 = 0.1;
-/// Share of the largest displacement below which a distance from rest takes more than single precision.
-const FINE: f32 = 2e-4;
+/// Share of the largest displacement below which a distance from rest takes more than single precision, and the same of `|f| / b` along
+/// gradients: sixteen times the rounding of a displacement.
+const FINE: f32 = 2e-3;
+const FINE_GRADIENT: f32 = 1e-6;
 /// How often the steps are halved after one was refused.
 const MOST_HALVINGS: u32 = 8;
 /// No swing is shorter than this share of the longest one: where stiff modes alone were stopped, soft ones would never
 /// begin to move.
 const SHORTEST: u32 = 8;
-/// Steps along gradients, at least, and at most for each step of the longest swing.
-const LEAST_GRADIENTS: u32 = 10;
+/// Steps along gradients, at least, as a share of those of the first swing: each goes one element farther, and has not met all of a body
+/// before. And at most for each step of the longest swing.
+const LEAST_GRADIENTS: f32 = 0.5;
 const MOST_GRADIENTS: u32 = 32;
 /// They end so much nearer to rest than asked for, by their own estimate, and are looked at by a swing, so many times at most.
 const CLOSER: f32 = 0.1;
@@ -189,7 +192,7 @@ pub fn settle_in_parts<M: ElementMaterial>(
         line,
         way: Way::Dynamic,
         gradients: 0,
-        nearest: (f32::INFINITY, 0),
+        least: (f32::INFINITY, 0),
         checks: 0,
         halvings: 0,
         is_fine: false,
@@ -360,8 +363,8 @@ struct Run<'a> {
     way: Way,
     /// Steps along gradients.
     gradients: u32,
-    /// The nearest to rest that they have been by their estimate, m, and after how many.
-    nearest: (f32, u32),
+    /// The least `|f| / b` of them, m, and after how many.
+    least: (f32, u32),
     checks: u32,
     halvings: u32,
     is_fine: bool,
@@ -428,7 +431,7 @@ impl Run<'_> {
 
     fn turn_to_gradients(&mut self, state: StateView<'_>) {
         self.way = Way::Gradients;
-        (self.bounds.left, self.gradients, self.nearest) = (0, 0, (f32::INFINITY, 0));
+        (self.bounds.left, self.gradients, self.least) = (0, 0, (f32::INFINITY, 0));
         self.line.again();
         state.increment.fill(NodeVector::ZERO);
         self.base.fill(NodeVector::ZERO);
@@ -443,7 +446,7 @@ impl Run<'_> {
         mut state: StateView<'_>,
         threads: &impl Threads,
     ) -> bool {
-        let Self { step, bounds, swing, settled, begin, base, line, gradients, nearest, is_fine, metre, .. } = self;
+        let Self { step, bounds, settled, begin, base, line, gradients, least, checks, is_fine, metre, .. } = self;
         let is_finite = bounds.left > 0 || bounds.look(scene, loads, state.reborrow(), true);
         let status = if is_finite {
             let mut steps = Conjugate::new(line, bounds.rates, base, threads, *is_fine);
@@ -466,18 +469,24 @@ impl Run<'_> {
             return self.go_on_by_motion(scene, state, f32::INFINITY);
         }
         *gradients += 1;
-        let remaining = if *gradients < LEAST_GRADIENTS { f32::INFINITY } else { line.remaining() };
-        *is_fine = remaining < FINE * farthest(&[], state.displacement);
+        let usual = Swing::first(scene.node_count()).longest;
+        let met_all = *gradients as f32 >= LEAST_GRADIENTS * usual as f32;
+        let remaining = if met_all { line.remaining() } else { f32::INFINITY };
+        *is_fine = line.gradient() < FINE_GRADIENT * farthest(&[], state.displacement);
         let extremes = state.progress.extremes;
         bounds.enter(&extremes);
-        if remaining < 0.5 * nearest.0 {
-            *nearest = (remaining, *gradients);
+        if line.gradient() < 0.5 * least.0 {
+            *least = (line.gradient(), *gradients);
         }
-        let is_stuck = *gradients > nearest.1 + (*gradients / 2).max(8 * swing.longest);
+        let swing = usual.max(line.quarter(4.0 * bounds.share));
+        let is_stuck = *gradients > least.1 + (*gradients / 2).max(16 * swing) || *gradients >= MOST_GRADIENTS * swing;
         if is_stuck {
-            return self.go_on_by_motion(scene, state, f32::INFINITY);
+            // Rounding may keep them there: a motion goes on if it does not say that the body is at rest.
+            *checks = MOST_CHECKS;
+            let told = if remaining < *metre { remaining } else { f32::INFINITY };
+            return self.go_on_by_motion(scene, state, told);
         }
-        if remaining < CLOSER * *metre || *gradients >= MOST_GRADIENTS * swing.longest {
+        if remaining < CLOSER * *metre {
             return self.go_on_by_motion(scene, state, remaining);
         }
         true
