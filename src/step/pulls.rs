@@ -26,12 +26,12 @@ struct Point {
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
-    /// Adds the forces of pulls at the end of an exact step to the total forces; none moves its point by more than a share
+    /// Adds the forces of pulls ([`crate::pulls`]) in an exact step to the total forces; none moves its point by more than a share
     /// `most_way` of the size of a node's tissue. Gives their work, J.
     #[inline(never)]
     pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> f32 {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
-        let end = self.progress.time + f64::from(step.seconds());
+        let start = self.progress.time;
         self.pulls.fill(NodeVector::ZERO);
         let mut sweep = 0;
         loop {
@@ -39,8 +39,10 @@ impl<M: ElementMaterial> Trial<'_, M> {
             for (index, pull) in pulls.acting() {
                 let now = at(self.pulls, index);
                 let point = self.pulled_point(pulls, pull, (step, method));
-                let gap = (pull.target(end) - pull.unmoved()) - (point.here + point.next);
-                let change = pull.force(gap, now, point.compliance) - now;
+                let [late, next, last] = point.shares(pull.stiffness);
+                let time = start + f64::from(late * step.seconds());
+                let gap = (pull.target(time) - pull.unmoved()) - (point.here + next * point.next - last * point.last);
+                let change = pull.force(gap, now, next * point.compliance) - now;
                 let first = pulls.nodes_of(pull).first();
                 let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
                 let change = point.without_tearing(change, most_way * most_way * most_way * volume);
@@ -114,6 +116,13 @@ impl<M: ElementMaterial> Trial<'_, M> {
 }
 
 impl Point {
+    /// How far into the step a pull of this stiffness takes the force, as a share of it, and the shares of the next and of the last
+    /// motion of the point in where it takes it.
+    fn shares(&self, stiffness: f32) -> [f32; 3] {
+        let late = 1.0 - 1.0 / (1.0 + stiffness * self.compliance.max_element());
+        [late, 0.25 + 0.75 * late, 0.25 - 0.25 * late]
+    }
+
     /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, the edge of
     /// this volume (m^3), or no farther than it moves by itself.
     fn without_tearing(&self, change: Vec3, volume: f32) -> Vec3 {

@@ -43,6 +43,34 @@ fn a_free_body_swings_about_its_target_with_the_period_of_a_spring() {
     assert!((period / expected - 1.0).abs() < 0.01);
 }
 
+/// Nothing damps it but what the pull does by itself: of second order in the step, not of first.
+#[test]
+fn an_undamped_body_on_a_pull_goes_on_swinging() {
+    let (stiffness, way) = (1000.0, 0.002);
+    // So stiff that the bar hardly vibrates itself.
+    let tissue = VecMaterial::one(Element::Linear, NeoHookean { c: 20_000.0, d: 400_000.0 }, 1000.0);
+    let mut body =
+        Simulation::new(BAR.points(), BAR.tets(), tissue, &[]).unwrap().with(settings(Method::Exact, 0.0, None));
+    let at = [0.015, 0.015, 0.06];
+    let pull = body.pull(at, 0.07, stiffness).unwrap();
+    body.pulls[pull].most = f32::INFINITY;
+    body.pulls[pull].put([at[0], at[1] + way, at[2]]);
+    let mut largest_gap = |seconds: f64| {
+        let (end, mut largest) = (body.state().time() + seconds, 0.0f32);
+        while body.state().time() < end {
+            body.advance(0.001).unwrap();
+            largest = largest.max(body.pulled(pull).unwrap().gap[1].abs());
+        }
+        (largest, body.state().last_step())
+    };
+    let (first, step) = largest_gap(0.1);
+    largest_gap(1.8);
+    let (last, _) = largest_gap(0.1);
+    let of_first_order = (-1.9 * stiffness * step / (2.0 * MASS)).exp();
+    println!("amplitude {:.4} of the first after 1.9 s; backward Euler would leave {of_first_order:.2}", last / first);
+    assert!(first > 0.9 * way && (last / first - 1.0).abs() < 0.02 && of_first_order < 0.9);
+}
+
 #[test]
 fn a_pull_along_one_direction_leaves_the_others_free() {
     let mut body = bar(Element::NodalPressure, false).with(settings(Method::Exact, 5.0, None));
