@@ -48,6 +48,8 @@ pub(super) struct Control {
     half_life: f32,
     lengths: u32,
     halvings: u32,
+    /// Halvings with which the length is no longer than the present call.
+    of_call: u32,
     /// Since the latest change, or since a probe has begun or ended.
     seconds: f32,
     comparisons: u32,
@@ -83,6 +85,7 @@ impl Control {
             tolerance,
             lengths,
             halvings: lengths,
+            of_call: 0,
             seconds: 0.0,
             comparisons: 0,
             error: 0.0,
@@ -122,6 +125,18 @@ impl Control {
         self.left_behind = self.left_behind.map(|error| kept * error);
     }
 
+    /// A call begins that lasts so many times the longest length. No step is longer than a call, and the second run's steps
+    /// belong to the length: with one far longer than that, it would be compared too seldom.
+    pub(super) fn enter_call(&mut self, ratio: f32) {
+        let is_shorter = |&halvings: &u32| libm::exp2f(-(halvings as f32)) <= ratio;
+        self.of_call = (0..self.lengths).find(is_shorter).unwrap_or(self.lengths);
+    }
+
+    /// Whether the length is to change as soon as it can, as it is more than twice that of the call.
+    pub(super) const fn is_far_longer_than_call(&self) -> bool {
+        self.halvings + 1 < self.of_call
+    }
+
     /// Enters how far (m) instruments and targets go in a step of so many seconds. Gives whether exact steps are to meet them.
     pub(super) fn enter_way(&mut self, way: f32, seconds: f32) -> bool {
         let (before, speed) = (libm::exp2f(-seconds / HALF_LIFE) * self.speed, way / seconds);
@@ -143,7 +158,8 @@ impl Control {
     /// Whether a probe begins with the next step.
     pub(super) fn begins_probe(&mut self) -> bool {
         let is_quieter = self.kinetic < QUIETER * self.kinetic_of_probe && self.seconds >= REST[0];
-        if self.probe == Probe::None && (is_quieter || self.seconds >= self.rest) {
+        let may_lengthen = self.of_call < self.lengths;
+        if self.probe == Probe::None && may_lengthen && (is_quieter || self.seconds >= self.rest) {
             self.probe = Probe::Begins;
         }
         let begins = self.probe == Probe::Begins;
@@ -211,12 +227,16 @@ impl Control {
             self.shorten(halvings, [mean, largest]);
             return true;
         }
+        if self.is_far_longer_than_call() {
+            self.shorten(self.of_call - self.halvings, [mean, largest]);
+            return true;
+        }
         self.comparisons >= COMPARISONS && self.seconds >= WAIT && share * libm::exp2f(ORDER) <= AIM && self.lengthen()
     }
 
     /// Doubles the length. Gives whether it could.
     fn lengthen(&mut self) -> bool {
-        let longer = self.halvings > 0;
+        let longer = self.halvings > self.of_call;
         if longer {
             self.halvings -= 1;
             self.changed();

@@ -25,7 +25,7 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::StateView;
+use crate::state::{Moment, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, Work};
 use crate::tled::{self, Approach, Pace, vectors_for_pace};
 use control::Control;
@@ -74,6 +74,8 @@ pub(crate) struct Chooser {
     memory: usize,
     /// Vectors of the first run's inertia.
     vectors: usize,
+    /// At the end of the latest call.
+    moment: Option<Moment>,
 }
 
 /// Adaptive steps without their storage; they may be moved in memory.
@@ -160,6 +162,7 @@ impl Chooser {
             memory: scene.memory_vectors(),
             vectors: vectors_for_method(method, scene, points)?,
             request,
+            moment: None,
         })
     }
 
@@ -261,6 +264,19 @@ pub struct Taken {
     pub large: u32,
     /// Changes of the length.
     pub changes: u32,
+    /// The shortest and the longest step, s; zeros if none was taken.
+    pub seconds: [f32; 2],
+}
+
+impl Taken {
+    fn enter_length(&mut self, length: f32) {
+        self.seconds = merged(self.seconds, [length; 2]);
+    }
+}
+
+/// The extremes of both; zeros are none.
+fn merged([shortest, longest]: [f32; 2], [more, other]: [f32; 2]) -> [f32; 2] {
+    [if shortest > 0.0 && (more == 0.0 || shortest < more) { shortest } else { more }, longest.max(other)]
 }
 
 impl Add for Taken {
@@ -271,6 +287,7 @@ impl Add for Taken {
             exact: self.exact.saturating_add(more.exact),
             large: self.large.saturating_add(more.large),
             changes: self.changes.saturating_add(more.changes),
+            seconds: merged(self.seconds, more.seconds),
         }
     }
 }
@@ -287,23 +304,65 @@ impl AdaptiveView<'_> {
         threads: &impl Threads,
     ) -> (Status, Taken) {
         let end = state.time() + f64::from(seconds);
-        let (mut worst, mut taken) = (Status::Ok, Taken::default());
+        let mut taken = Taken::default();
+        let Self { chooser: Chooser { control, request, moment, .. }, watch, .. } = &mut self;
+        let is_known = moment.is_none_or(|moment| moment == state.progress.moment());
+        control.enter_call((1.0 + ROUNDING as f32) * seconds / request.longest.seconds());
+        if control.is_far_longer_than_call() {
+            watch.compare_next();
+        }
+        if !is_known && control.halvings().is_some() {
+            // Stopped, restored or put, or moved by others: what they knew of its motion holds no longer.
+            control.go_exactly([0.0; 2]);
+            self.change(scene, None, state.reborrow(), threads, &mut taken);
+        }
+        let status = self.advance_until(end, work, scene, loads, state.reborrow(), threads, &mut taken);
+        self.chooser.moment = Some(state.progress.moment());
+        (status, taken)
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn advance_until<M: ElementMaterial>(
+        &mut self,
+        end: f64,
+        work: &mut Work,
+        scene: SceneView<'_, M>,
+        loads: &mut impl LoadsOverTime,
+        mut state: StateView<'_>,
+        threads: &impl Threads,
+        taken: &mut Taken,
+    ) -> Status {
+        let (mut worst, seconds) = (Status::Ok, end - state.time());
         loop {
             let left = end - state.time();
             // A remainder of rounding is no step, and a span that is no number none either.
-            if left.is_nan() || left <= ROUNDING * f64::from(seconds) || work.is_spent() {
-                return (worst, taken);
+            if left.is_nan() || left <= ROUNDING * seconds || work.is_spent() {
+                return worst;
             }
             let state = state.reborrow();
             let status = if self.chooser.control.halvings().is_none() {
-                self.exact_steps(left, work, scene, loads, state, threads, &mut taken)
+                self.exact_steps(left, work, scene, loads, state, threads, taken)
             } else {
-                self.large_steps(left, work, scene, loads, state, threads, &mut taken)
+                self.large_steps(left, work, scene, loads, state, threads, taken)
             };
             match status {
                 Ok(status) => worst = worst.worse(status),
-                Err(last) => return (worst.worse(last), taken),
+                Err(last) => return worst.worse(last),
             }
+        }
+    }
+
+    /// See [`LargeView::shorten`](crate::inertia::LargeView::shorten), of the first run.
+    pub(crate) fn end_long_steps<M: ElementMaterial>(
+        self,
+        seconds: f32,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        threads: &impl Threads,
+    ) {
+        if let Some(StorageParts { first, .. }) = self.chooser.parts(self.storage) {
+            let _ = self.first.with_storage(first).shorten(seconds, scene, loads, state, threads);
         }
     }
 
@@ -337,6 +396,7 @@ impl AdaptiveView<'_> {
             }
             taken.exact += 1;
             let seconds = state.last_step();
+            taken.enter_length(seconds);
             control.wait(seconds);
             control.enter_kinetic(state.energy_balance.kinetic, seconds);
             control.enter_way(loads.way(state.time() - f64::from(seconds), seconds), seconds);
@@ -427,6 +487,7 @@ impl AdaptiveView<'_> {
                 return Ok(worst);
             }
             taken.large += 1;
+            taken.enter_length(seconds);
             control.wait(seconds);
             worst = worst.worse(judged(status, estimate[0], self.chooser.request.tolerance));
             if self.watch.comparisons() > before && control.decide(estimate) {

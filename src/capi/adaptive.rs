@@ -203,7 +203,7 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let mut state = loads.attached(opened_of(&open, state)?);
         let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
         let mut work = Work::UNBOUNDED;
-        let (status, Taken { exact, large, changes }) =
+        let (status, Taken { exact, large, changes, .. }) =
             view.advance(span.seconds(), &mut work, open.view(), &mut loads.of_call, state.reborrow(), &threads);
         loads.enter(state.touches());
         report.enter(&status, &state);

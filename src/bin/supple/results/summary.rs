@@ -312,7 +312,7 @@ fn adaptive_section(AdaptiveTrace { tolerance, taken }: &AdaptiveTrace) -> Summa
         format!("{millimetres:.3} mm on average over the nodes"),
         json!({ "tolerance_mm": millimetres }),
     );
-    let Taken { exact, large, changes } = taken;
+    let Taken { exact, large, changes, .. } = taken;
     section.add(
         "steps chosen",
         format!("{exact} exact, {large} beyond the critical step, {changes} changes of length"),

@@ -211,7 +211,7 @@ impl AdaptiveTrace {
 
     /// Takes down what a span took.
     pub(crate) fn enter(&mut self, &Report { exact, long: large, changes, .. }: &Report) {
-        self.taken = self.taken + Taken { exact, large, changes };
+        self.taken = self.taken + Taken { exact, large, changes, ..Taken::default() };
     }
 }
 
