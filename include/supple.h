@@ -1610,8 +1610,9 @@ typedef struct {
      */
     uint32_t cells[3];
     /**
-     * The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four. 0: as
-     * much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on from there.
+     * The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four, and
+     * is taken while any is left. 0: as much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on
+     * from there.
      */
     uint32_t most_steps;
     /**

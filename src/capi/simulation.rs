@@ -13,7 +13,7 @@ use crate::material::Element;
 use crate::mlp::Network;
 use crate::simulation::{Clock, Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Mover, usual_tolerance};
 use crate::state::NodeVector;
-use crate::step::{CriticalStep, Status, Step, Work};
+use crate::step::{CallingThread, CriticalStep, Status, Step, Work};
 use crate::tled::{Pace, vectors_for_pace};
 
 use super::SUPPLE_NONE;
@@ -74,8 +74,9 @@ pub struct supple_settings {
     pub lead_in: f64,
     /// Cells of the lattice of long steps along x, y, z; zeros: chosen for the scene.
     pub cells: [u32; 3],
-    /// The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four. 0: as
-    /// much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on from there.
+    /// The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four, and
+    /// is taken while any is left. 0: as much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on
+    /// from there.
     pub most_steps: u32,
     /// Most forces on nodes that the loads will have.
     pub forces: u32,
@@ -699,7 +700,7 @@ pub(super) unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -
             return Err(short(bytes, steps + needed));
         }
         if settings.steps != SUPPLE_STEPS_LONG {
-            opened_of(&open, state)?.end_long_steps(critical);
+            end_long_steps(sim, &open, critical)?;
         }
         let mut room = Room { start: sim.cast(), used: steps, bytes };
         (*sim).prepared = Prepared::None;
@@ -707,6 +708,24 @@ pub(super) unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -
         let made = made(settings, critical, &mut room, (scene, state), points, of_pace)?;
         ((*sim).prepared, (*sim).end) = (made, room.used);
         (*sim).work = if settings.most_steps == 0 { Work::UNBOUNDED } else { Work::of(settings.most_steps) };
+        Ok(())
+    }
+}
+
+/// Lets the velocities be those at the time of the state, where long steps have brought it there.
+///
+/// # Safety
+/// As at [`supple_sim_set`].
+unsafe fn end_long_steps(sim: *mut supple_sim, open: &OpenScene<'_>, critical: CriticalStep) -> Answer<()> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let objects = objects_of(sim)?;
+        let mut loads = CallLoads::of(objects.loads, open)?;
+        let mut state = loads.attached(opened_of(open, objects.state)?);
+        if let Ok(mover) = (*sim).prepared.mover(sim) {
+            mover.end_long_steps(critical.seconds, open.view(), &mut loads.of_call, state.reborrow(), &CallingThread);
+        }
+        state.end_long_steps(critical);
         Ok(())
     }
 }

@@ -43,6 +43,12 @@ pub struct LargeModel {
     /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
     prepared: Step,
+    /// Time (s) between the latest steps for which forces have yet to act: each may act for little more than a step, which is
+    /// less than there is after one that was much longer.
+    pub(super) owed: f32,
+    /// Whether the next step calms rough motion that much shorter ones have left ([`LargeModel::follow`]).
+    pub(super) calms: bool,
+    pub(super) has_stepped: bool,
     /// What the stiffness in `S` is multiplied by, in steps up to the first one (s) and in longer ones
     /// ([`super::rest_check`]).
     stiffening: [f32; 2],
@@ -186,6 +192,9 @@ impl LargeModel {
             rough: RoughMotion::NONE,
             step,
             prepared: step,
+            owed: 0.0,
+            calms: false,
+            has_stepped: false,
             is_for_other_step: false,
             scaling: scaling_of(step, 1.0),
             stiffening: [1.0; 2],
@@ -316,6 +325,12 @@ impl LargeModel {
     #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
     pub(crate) const fn renew_soon(&mut self) {
         self.is_for_other_step = true;
+    }
+
+    /// A call of long steps begins at this state. Where others have brought it there, the vibrations of much shorter steps, which
+    /// these do not resolve, are not carried over: as velocities of a long step they would tear the mesh.
+    pub(crate) fn follow(&mut self, progress: &Progress) {
+        self.calms = !self.has_stepped || self.moment != progress.moment();
     }
 
     /// The clock of the state has been set since the latest step: inertia still belongs to it.

@@ -15,7 +15,8 @@ use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
 use crate::state::Progress;
 use crate::step::Step;
 
-/// Longest time for which a force acts in a step, over the step: inertia makes the step stable for one.
+/// Longest time for which a force acts in a step, over the step: inertia makes the step stable for one. What is more after a longer
+/// step acts in those that follow ([`LargeModel::owed`]): a body that falls would lose it.
 const LONGEST_SPAN: f32 = 1.25;
 
 /// Factors of the residual of a node, `D^2 f - 2 k m du`.
@@ -26,6 +27,8 @@ pub(super) struct ResidualFactors {
     square: f32,
     /// `2 k`, times the ratio of the step to the last one.
     loss: f32,
+    /// What steps afterwards owe, s.
+    owed: f32,
 }
 
 impl ResidualFactors {
@@ -42,9 +45,16 @@ impl ResidualFactors {
         let removed = removed_share(progress.energy_balance.allowed_share());
         let stable = (2.0 - removed.max(rough_motion::MOST)) / (2.0 - rough_motion::MOST);
         let ratio = stable * (1.0 + model.scaling.k) / (1.0 + k);
-        let span = if progress.steps == 0 { 0.5 } else { (0.5 * (1.0 + 1.0 / step.carry())).min(LONGEST_SPAN) };
+        let due = 0.5 * (1.0 + 1.0 / step.carry()) + model.owed / step.seconds();
+        let span = if progress.steps == 0 { 0.5 } else { due.min(LONGEST_SPAN) };
         let square = step.seconds() * step.seconds() * span;
-        Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry() }
+        let owed = if progress.steps == 0 { 0.0 } else { step.seconds() * (due - span) };
+        Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry(), owed }
+    }
+
+    /// The time (s) for which forces have yet to act after the step ([`LargeModel::owed`]).
+    pub(super) const fn owed(&self) -> f32 {
+        self.owed
     }
 }
 
@@ -99,7 +109,7 @@ impl PassInput<'_> {
     #[inline(always)]
     pub(super) fn residual<R: Real>(&self, nodes: &NodeValues<R>) -> [R; 3] {
         let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
-        let ResidualFactors { square, loss } = self.residual;
+        let ResidualFactors { square, loss, .. } = self.residual;
         let (square, loss) = (R::splat(square), R::splat(loss) * mass);
         [free[0] * (square * fx - loss * vx), free[1] * (square * fy - loss * vy), free[2] * (square * fz - loss * vz)]
     }

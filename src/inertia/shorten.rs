@@ -6,6 +6,7 @@
 //! ```text
 //! du' = r (du + du+) / 2 - r^2 (du+ - du) / 2
 //! ```
+//! and, where forces have yet to act for a time (`owed` of the model), with that acceleration for it.
 
 use super::large_step::LargeView;
 use super::lattice::rank_of;
@@ -43,6 +44,11 @@ impl LargeView<'_> {
             Ok(trial) => trial,
             Err(refused) => return refused,
         };
+        let owed = if model.moment == trial.progress.moment() {
+            core::mem::take(&mut model.owed) / step.seconds()
+        } else {
+            0.0
+        };
         let mut method = InertiaStep::new(&step, model, storage, threads);
         let _ = method.compute(&mut trial);
         let next = |node| {
@@ -54,7 +60,7 @@ impl LargeView<'_> {
         let (mut work, gravity) = (0.0, loads.gravity());
         let shortened = |last: f32, next: f32, free: bool| {
             let gain = if all_finite && free { 0.5 * (next - last) } else { 0.0 };
-            share * (last + gain) - share * share * gain
+            share * (last + gain) - share * share * gain + share * owed * 2.0 * gain
         };
         // What acts now has acted since the middle of the last step.
         for load in loads.forces() {

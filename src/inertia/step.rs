@@ -31,6 +31,7 @@ use super::{ADDED_AT_LARGEST_STRAIN, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, 
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
+const MUCH_LONGER: f32 = 2.0;
 const LARGEST_UNUSED: f32 = 0.05;
 const LEAST_COARSE_SHARE: f32 = 0.8;
 
@@ -90,6 +91,8 @@ pub(super) struct InertiaStep<'a, T> {
     rough_written: bool,
     coarse_share: f32,
     damping: f32,
+    /// See [`LargeModel::owed`], after this step.
+    owed: f32,
     /// The share of `S^-1` in this step, if the lattice is in use.
     pub(super) response: Option<f32>,
 }
@@ -106,6 +109,7 @@ impl<'a, T> InertiaStep<'a, T> {
             rough_written: false,
             coarse_share: 1.0,
             damping: 0.0,
+            owed: 0.0,
             response: None,
         }
     }
@@ -163,8 +167,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
         let Self { model, storage, held_back, coarse_share, .. } = self;
-        let LargeModel { lattice, renewal, report, nodes, moment, .. } = &mut **model;
-        *moment = trial.progress.moment();
+        let LargeModel { lattice, renewal, report, nodes, moment, owed, calms, has_stepped, .. } = &mut **model;
+        (*moment, *owed) = (trial.progress.moment(), self.owed);
+        (*calms, *has_stepped) = (false, true);
         renewal.enter(storage.room.part, lattice, &storage.matrices.frames);
         *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
@@ -192,7 +197,7 @@ impl<T: Threads> InertiaStep<'_, T> {
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
         let Self { model, threads, storage: Storage { tables, places, matrices, .. }, .. } = self;
-        let LargeModel { lattice, renewal, scaling, rough, moment, is_for_other_step, .. } = &mut **model;
+        let LargeModel { lattice, renewal, scaling, rough, moment, owed, is_for_other_step, .. } = &mut **model;
         let Trial { scene, displacement, volume, progress, .. } = trial;
         let follows = *moment == progress.moment();
         if follows && !*is_for_other_step {
@@ -203,7 +208,7 @@ impl<T: Threads> InertiaStep<'_, T> {
         let input = RenewalInput { scene: *scene, displacement, volume, lattice, places, scaling };
         renewal.renew_all(input, tables, matrices, *threads);
         if !follows {
-            *rough = RoughMotion::NONE;
+            (*rough, *owed) = (RoughMotion::NONE, 0.0);
             tables.clear_rough();
             *moment = progress.moment();
         }
@@ -214,7 +219,7 @@ impl<T: Threads> InertiaStep<'_, T> {
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> MovedLattice {
         let Self { step, model, threads, storage: Storage { tables, places, matrices, room }, .. } = self;
         let residual = ResidualFactors::new(step, model, trial.progress);
-        let LargeModel { lattice, renewal, scaling, rough, method, .. } = &mut **model;
+        let LargeModel { lattice, renewal, scaling, rough, method, calms, .. } = &mut **model;
         let others_pull = renewal.pulls.follow(trial.loads.pulls(), lattice, places);
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
         let (scene, places) = (*scene, &**places);
@@ -242,11 +247,16 @@ impl<T: Threads> InertiaStep<'_, T> {
         let pull = pull.each_mut().map(|vectors| &mut **vectors);
         let supports = supports.pull(loads, progress.time, step, increment, tables.scratch, pull);
         let has_part = write_part(matrices, lattice, &renewal.bands, largest, part);
+        let carry = step.carry();
+        let kept = if *calms { kept_share(carry) } else { 1.0 };
+        if carry != 1.0 {
+            part.iter_mut().for_each(|vector| vector.0 = (carry * Vec4::from(vector.0)).to_array());
+        }
         let coarse = CoarseMotion {
             space: CoarseSpace { lattice, renewal, matrices },
             has_part,
             supports: supports.as_ref(),
-            allowed: progress.energy_balance.allowed_share(),
+            allowed: progress.energy_balance.allowed_share().min(kept),
             largest_strain: strain_share(renewal.added.mean)
                 * if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
@@ -254,11 +264,11 @@ impl<T: Threads> InertiaStep<'_, T> {
             coarse.compute(motion, part, scratch.each_mut().map(|vectors| &mut **vectors));
         let removed = removed_share(share.min(coarse.allowed));
         prolong(motion, lattice, matrices.cells);
-        self.damping = step.carry() * rough.share(method.gain);
+        self.damping = rough.share(method.gain);
         (self.coarse_share, self.response) = (share, Some(share));
         MovedLattice {
             has_smooth: has_part,
-            removed: self.damping.max(removed),
+            removed: carry * self.damping.max(removed),
             work: work / (step.seconds() * step.seconds()),
         }
     }
@@ -268,6 +278,7 @@ impl<T: Threads> InertiaStep<'_, T> {
     fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: &MovedLattice) -> Totals {
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
         let residual = ResidualFactors::new(step, model, trial.progress);
+        self.owed = residual.owed();
         let Trial { scene, increment, force, .. } = trial;
         let scaling = &model.scaling;
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
@@ -281,6 +292,13 @@ impl<T: Threads> InertiaStep<'_, T> {
         totals.add_work(moved.work);
         totals
     }
+}
+
+/// The share of the kinetic energy that strain rates keep in a step that is so many times as long as the last one. More inertia is
+/// added, and momentum stays: of a velocity that `(h / D)^2` of the added inertia bore, that share is kept.
+fn kept_share(carry: f32) -> f32 {
+    let kept = if carry > MUCH_LONGER { 1.0 / (carry * carry) } else { 1.0 };
+    kept * kept
 }
 
 /// Largest ratio of a vector of the smooth motion to the largest increment. It may exceed one, because lattice points

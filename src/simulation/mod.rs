@@ -79,8 +79,8 @@ pub struct Settings<'w> {
     pub tolerance: Option<f32>,
     /// Whether a guard estimates the error of long and of learned steps.
     pub guard: bool,
-    /// The most work that a call of `advance` takes, in exact steps (a long or a learned one counts four): when it is
-    /// spent the call ends with [`Status::Behind`](crate::step::Status::Behind), and the next goes on from there. As much
+    /// The most work that a call of `advance` takes, in exact steps (a long or a learned one counts four, and is taken
+    /// while any is left): when it is spent the call ends with [`Status::Behind`](crate::step::Status::Behind), and the next goes on from there. As much
     /// as it takes unless given.
     pub most_steps: Option<u32>,
     /// Whether a given length of exact steps may be above the critical step: for experiments.

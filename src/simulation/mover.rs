@@ -145,6 +145,31 @@ impl Mover<'_, '_> {
     }
 }
 
+impl Mover<'_, '_> {
+    /// Steps of another kind follow, of about so many seconds: those beyond the critical one give the last increment the velocity
+    /// at its end, under the loads as they are.
+    pub(crate) fn end_long_steps<M: ElementMaterial>(
+        self,
+        seconds: f32,
+        scene: SceneView<'_, M>,
+        loads: &mut impl LoadsOverTime,
+        state: StateView<'_>,
+        threads: &impl Threads,
+    ) {
+        if state.last_step() <= seconds {
+            return;
+        }
+        let loads = loads.of_step(&state, state.last_step(), u32::MAX);
+        match self {
+            Self::Long(model, storage, _) => {
+                let _ = model.with_storage(storage).shorten(seconds, scene, &loads, state, threads);
+            }
+            Self::Auto(adaptive) => adaptive.end_long_steps(seconds, scene, &loads, state, threads),
+            Self::Exact(_) | Self::Learned(..) => {}
+        }
+    }
+}
+
 impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
     /// Takes exact steps for `span` seconds; the call goes on for `rest` seconds after them. Whether all were taken.
     fn exact_steps<M: ElementMaterial>(
@@ -255,6 +280,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         state: &mut StateView<'_>,
     ) {
         let until = state.time() + span;
+        model.follow(state.progress);
         let mut longest = model.longest();
         let shortest = longest / (1 << MOST_HALVINGS) as f32;
         let (mut left, mut seconds) = equal_steps(span, longest);
@@ -310,7 +336,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         report.estimate = chooser.estimate(watch);
         (report.exact, report.long, report.changes) = (taken.exact, taken.large, taken.changes);
         report.undone = u32::from(!status.is_taken());
-        report.enter_length(chooser.seconds());
+        report.seconds = taken.seconds;
         (self.watch)(Event::Judged(status, report.estimate, state));
         report.enter(status);
     }

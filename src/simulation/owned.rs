@@ -142,7 +142,21 @@ impl<'w> Simulation<'w> {
 
     /// See [`Simulation::with`].
     pub fn set(&mut self, settings: Settings<'w>) {
+        if !matches!(settings.method, Method::Long(_)) {
+            self.end_long_steps();
+        }
         (self.settings, self.prepared) = (settings, None);
+    }
+
+    /// Lets the velocities be those at the time of the state, where long steps have brought it there.
+    fn end_long_steps(&mut self) {
+        let Ok(critical) = self.critical_step() else { return };
+        // With loads that cannot be, velocities stay as they are.
+        let Ok(Acting { mut loads, scene, state, prepared, .. }) = self.acting() else { return };
+        if let Some(prepared) = prepared {
+            let (mover, state) = (prepared.mover(), state.view());
+            mover.end_long_steps(critical.seconds, scene.view(), &mut loads, state, &CallingThread);
+        }
     }
 
     /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which

@@ -7,7 +7,7 @@ use supple::guard::{self, Guard};
 use supple::inertia::{self, Cells, LargeStep};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{LoadError, Loads, Motion, NodalForce};
-use supple::material::{Element, VecMaterial};
+use supple::material::{Element, NeoHookean, VecMaterial};
 use supple::mlp::{Network, WeightBytes};
 use supple::scene::{Axes, Support, VecScene};
 use supple::simulation::{Method, Report, Settings, Simulation, SimulationError};
@@ -16,7 +16,7 @@ use supple::step::{CriticalStep, Status, Step};
 use supple::tled;
 
 use crate::support::bodies::{far_end, held, small_bar, torsion};
-use crate::support::{Body, EXP, bits};
+use crate::support::{Body, EXP, bits, mean_distance, to_f64};
 
 const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
@@ -398,5 +398,85 @@ fn settings_may_change_from_long_to_exact_steps() {
         assert!(reports.iter().all(|report| report.undone == 0 && report.is_ok()), "{reports:?}");
         // What long steps leave strained is set free, and no more: without care it is three times as much.
         assert!(kinetic < 15.0 * of_exact && of_exact > 1e-6);
+    }
+}
+
+/// A free body falls as bodies do, though calls last as they please and steps of other kinds follow: none loses momentum.
+#[test]
+fn a_body_falls_through_calls_of_any_length_and_changes_of_steps() {
+    let body = small_bar();
+    let material = VecMaterial::one(Element::NodalStrain, NeoHookean { c: 500.0, d: 5_000.0 }, 1000.0);
+    let falls = |name: &str, kind: &dyn Fn(usize) -> bool, span: &dyn Fn(usize) -> f64| {
+        let mut falling = Simulation::new(body.points.clone(), body.tets.clone(), material.clone(), &[]).unwrap();
+        falling.gravity = [0.0, 0.0, -9.81];
+        let (mut is_long, critical) = (None, falling.critical_step().unwrap().seconds);
+        for call in 0..60 {
+            if is_long != Some(kind(call)) {
+                is_long = Some(kind(call));
+                let method = if kind(call) { Method::Long(long()) } else { Method::Exact };
+                let step = kind(call).then_some(20.0 * critical);
+                falling.set(Settings { method, step, damping: 0.0, guard: false, ..Settings::default() });
+            }
+            falling.advance(span(call) * f64::from(critical)).unwrap();
+        }
+        let (time, nodes) = (falling.state().time(), falling.displacements().len() as f64);
+        let fallen = falling.displacements().iter().map(|u| f64::from(u.to_array()[2])).sum::<f64>() / nodes;
+        let expected = -0.5 * 9.81 * time * time;
+        println!("{name}: {:.2} mm in {:.0} ms, closed form {:.2} mm", 1e3 * fallen, 1e3 * time, 1e3 * expected);
+        // Half a step's gravity at the start, and what the last calls still owe.
+        assert!((fallen / expected - 1.0).abs() < 0.015, "{name}");
+    };
+    falls("long steps of one length", &|_| true, &|_| 20.0);
+    falls("long steps, calls of two lengths", &|_| true, &|call| if call % 2 == 0 { 20.0 } else { 4.0 });
+    falls("long steps, calls of many lengths", &|_| true, &|call| 3.0 + (call * 7 % 17) as f64);
+    falls("long and exact steps in turn", &|call| call / 5 % 2 == 1, &|_| 20.0);
+}
+
+/// After a rest, in which steps have become long, the next motion is followed from its beginning, in frames shorter than these
+/// steps, and also after the body was brought to rest.
+#[test]
+fn chosen_steps_follow_what_begins_after_a_rest() {
+    let body = small_bar();
+    let material = VecMaterial::one(Element::NodalStrain, NeoHookean { c: 500.0, d: 5_000.0 }, 1000.0);
+    let tolerance = 2e-4;
+    let start = |method| {
+        let settings = Settings { method, damping: 10.0, tolerance: Some(tolerance), ..Settings::default() };
+        let points = body.points.clone();
+        let mut bar =
+            Simulation::new(points, body.tets.clone(), material.clone(), &held(&body)).unwrap().with(settings);
+        bar.gravity = [0.0, 0.0, -1.0];
+        bar
+    };
+    for (frame, settles) in [(0.004, false), (1.0 / 60.0, false), (0.004, true)] {
+        let mut runs = [start(Method::Exact), start(Method::Auto(long()))];
+        let (mut silent, mut way, mut worst) = (0, 0.0, 0.0f64);
+        for run in &mut runs {
+            while run.state().time() < 1.0 {
+                run.advance(frame).unwrap();
+            }
+            if settles {
+                assert!(run.settle(1e-5, 10_000).unwrap().at_rest);
+            }
+            run.gravity = [6.0, 0.0, -1.0];
+        }
+        for _ in 0..(0.3 / frame) as usize {
+            let [exact, chosen] = &mut runs;
+            exact.advance(frame).unwrap();
+            let report = chosen.advance(frame).unwrap();
+            let span = frame as f32 * 1.001;
+            assert!(report.seconds[0] > 0.0 && report.seconds[1] <= span, "steps of {:?} s", report.seconds);
+            let [truth, now] = [&*exact, &*chosen].map(|run| to_f64(run.displacements()));
+            let error = mean_distance(&truth, &now);
+            way = mean_distance(&truth, &vec![[0.0; 3]; truth.len()]).max(way);
+            worst = worst.max(if report.is_ok() { error } else { 0.0 });
+            silent += usize::from(report.is_ok() && error > 1.2 * f64::from(tolerance));
+        }
+        println!(
+            "frames of {:.1} ms, settles: {settles}: {silent} silent, {:.3} of {:.2} mm while ok",
+            1e3 * frame,
+            1e3 * worst,
+            1e3 * way
+        );
+        assert!(silent == 0 && way > 2e-3);
     }
 }
