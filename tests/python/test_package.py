@@ -117,6 +117,49 @@ def test_what_cannot_be_is_refused_in_words(soft, attempt, words):
     print(caught.value)
 
 
+def test_a_mask_of_integers_is_refused_wherever_nodes_are_chosen(soft):
+    mesh = bar()
+    for count in (1, 16, len(mesh.points) - 1):
+        mask = np.arange(len(mesh.points)) < count
+        elements = np.arange(len(mesh.tets)) < count
+        for kind in (np.uint8, np.int64):
+            simulation = supple.Simulation(supple.Scene(mesh, soft, fixed=[0]))
+            for attempt in (
+                lambda: supple.Scene(mesh, soft, fixed=mask.astype(kind)),
+                lambda: supple.Scene(mesh, soft, moved=mask.astype(kind)),
+                lambda: supple.Scene(mesh, soft, removed=elements.astype(kind)),
+                lambda: simulation.set_forces(mask.astype(kind), [0.0, 0.0, 1.0]),
+                lambda: simulation.set_motions(mask.astype(kind), [0.0, 0.0, 1.0]),
+                lambda: simulation.reaction(mask.astype(kind)),
+                lambda: simulation.remove(elements.astype(kind)),
+                lambda: simulation.ablate(elements.astype(kind), soft, 0.0),
+            ):
+                with pytest.raises(supple.InputError, match=r"zeros and ones .* mask.astype\(bool\) or numpy.flatnonzero\(mask\)"):
+                    attempt()
+    # Of a scene of two elements these are numbers.
+    pair = supple.Mesh([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0.01, 0.01, 0.01]], [[0, 1, 2, 3], [1, 2, 3, 4]])
+    with pytest.raises(supple.InputError, match="the scene: "):
+        supple.Scene(pair, soft, removed=[0, 1])
+
+
+def test_what_a_node_that_is_named_twice_means(soft):
+    """A support is one whatever it is named, forces add up, and a node cannot go to two places."""
+    mesh = bar(cells=(2, 2, 4))
+    base, tip = np.flatnonzero(mesh.points[:, 2] < 1e-6), len(mesh.points) - 1
+    once, twice = (supple.Simulation(supple.Scene(mesh, soft, fixed=nodes, moved=[tip])) for nodes in (base, [*base, *base]))
+    for simulation, nodes, newton in ((once, [tip - 1], 0.002), (twice, [tip - 1, tip - 1], 0.001)):
+        simulation.set_forces(nodes, [newton, 0.0, 0.0])
+        simulation.set_motions([tip, tip], [0.0, 0.001, 0.0])
+    reactions = once.reaction(base), twice.reaction([*base, *base])
+    for simulation in (once, twice):
+        simulation.advance(0.02)
+    assert abs(once.displacements).max() > 1e-4 and (once.displacements == twice.displacements).all()
+    one, other = (reaction.force() for reaction in reactions)
+    assert (one.newton == other.newton).all() and abs(one.newton).max() > 0.0
+    with pytest.raises(supple.InputError, match=f"motions: entries 0 and 1 are both node {tip}, .* only one of them can hold"):
+        once.set_motions([tip, tip], [[0.0, 0.001, 0.0], [0.0, 0.002, 0.0]])
+
+
 def test_steps_are_refused_in_words(soft):
     mesh = bar()
     scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6)

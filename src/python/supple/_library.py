@@ -104,7 +104,7 @@ def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.floa
 
 
 def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> NDArray[np.uint32]:
-    """Numbers of nodes, or of elements, from numbers or from a mask over all of them."""
+    """Numbers of nodes, or of elements, from numbers or from a mask over all of them. Repeated ones stay repeated."""
     array = np.asarray(selection)
     if array.dtype == bool:
         if array.shape != (nodes,):
@@ -115,6 +115,12 @@ def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> N
         return np.zeros(0, np.uint32)
     if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
         raise errors.InputError(f"{what}: numbers of {kind}s or a mask are needed, not {array.dtype} of shape {array.shape}")
+    # As numbers they would be those of the first two, many times.
+    if array.size == nodes and ((array == 0) | (array == 1)).all() and len(np.unique(array)) < nodes:
+        raise errors.InputError(
+            f"{what}: as many {array.dtype} zeros and ones as there are {kind}s are taken neither as numbers nor as a mask: "
+            "for a mask give mask.astype(bool) or numpy.flatnonzero(mask)"
+        )
     bad = np.flatnonzero((array < 0) | (array >= nodes))
     if len(bad):
         raise errors.InputError(f"{what}: entry {bad[0]} is {kind} {array[bad[0]]}, there are {nodes} {kind}s")

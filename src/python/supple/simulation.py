@@ -243,7 +243,7 @@ class Simulation:
     @_one_at_a_time
     def set_forces(self, nodes: ArrayLike, newton: ArrayLike, ramp: float = 0.0) -> None:
         """Replaces all forces: on each of these nodes a force (N), one for all or a row for each, which rises evenly over the first `ramp` s
-        of the simulation: set later, it acts in full."""
+        of the simulation: set later, it acts in full. The forces on a node that is named twice add up."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "forces")
         rows = np.zeros(len(numbers), _FORCE)
         rows["node"], rows["newton"], rows["ramp"] = numbers, library.vectors(newton, "newton", len(numbers)), ramp
@@ -317,11 +317,19 @@ class Simulation:
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
         """Replaces all motions: moved nodes of the scene go to these displacements (m) along `axes`, evenly over the first `ramp` s of the
-        simulation, or over the next call of `advance` without one."""
+        simulation, or over the next call of `advance` without one. A node that is named twice must go to one place."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "motions")
         rows = np.zeros(len(numbers), _MOTION)
         rows["node"], rows["metre"], rows["ramp"] = numbers, library.vectors(metre, "metre", len(numbers)), ramp
         rows["axes"] = axes_of(axes, "motions")
+        _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+        bad = np.flatnonzero((rows["metre"] != rows["metre"][first[place]]).any(axis=1))
+        if len(bad):
+            one, other = first[place[bad[0]]], bad[0]
+            raise InputError(
+                f"motions: entries {one} and {other} are both node {numbers[other]}, "
+                f"with {rows['metre'][one].tolist()} and {rows['metre'][other].tolist()} m: only one of them can hold"
+            )
         error, motions = library.new_error(), library.pointer("supple_motion", rows)
         library.checked(lib.supple_set_motions(self._loads, self._raw_scene, motions, len(rows), error), error, "motions")
 
