@@ -213,6 +213,7 @@ class Simulation:
         self._pull_memory: PullMemory | None = None
         self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
+        self._traction: tuple[NDArray[np.uint32], ArrayLike, float] | None = None
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self.gravity = gravity
@@ -252,7 +253,8 @@ class Simulation:
     @_one_at_a_time
     def set_tractions(self, triangles: ArrayLike, pascal: ArrayLike, ramp: float = 0.0) -> None:
         """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, a force per area at rest
-        (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves."""
+        (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves; what is
+        removed it lets go of."""
         corners, points = np.asarray(triangles), self.scene.mesh.points
         if corners.size and (corners.ndim != 2 or corners.shape[1] != 3):
             raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
@@ -271,6 +273,7 @@ class Simulation:
         np.add.at(newton, place, found["newton"])
         rows["node"], rows["newton"], rows["ramp"] = nodes, newton, ramp
         self._set_forces(self._forces, rows)
+        self._traction = numbers.reshape(-1, 3), pascal, ramp
 
     def _set_forces(self, forces: NDArray[np.void], tractions: NDArray[np.void]) -> None:
         error, rows = library.new_error(), np.concatenate([forces, tractions])
@@ -461,8 +464,9 @@ class Simulation:
     @_one_at_a_time
     def remove(self, elements: ArrayLike) -> None:
         """Removes elements, as numbers or as a mask over all, as a resection does: see `exchange`. Nodes without an element stay in all
-        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed, and pressures act on
-        what is left of their surfaces, not on the cut; an open one fills no more."""
+        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed, and pressures and
+        tractions act on what is left of their surfaces, not on the cut; an open one fills no more. Forces stay on
+        their nodes."""
         scene = self.scene
         removed = scene._removed.copy()
         removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
