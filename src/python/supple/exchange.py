@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
@@ -137,6 +136,4 @@ def next_stage(simulation: Simulation) -> None:
     for ablation in due:
         ablation.stage = ablation.stage_at(now)
     simulation._ablations = [ablation for ablation in simulation._ablations if ablation.stage < _STAGES]
-    scene = copy.copy(simulation.scene)
-    scene._tissues = tissues
-    simulation.scene = scene
+    simulation.scene = simulation.scene._of_tissues(tissues)

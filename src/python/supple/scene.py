@@ -206,6 +206,13 @@ class Scene:
         made._build()
         return made
 
+    def _of_tissues(self, tissues: NDArray[np.void]) -> Scene:
+        """Another one of as many tissues of these constants, which are known to be good."""
+        made = copy.copy(self)
+        made._tissues, made._config = tissues, ffi.new("supple_scene_config *", self._config[0])
+        made._config.tissue = library.pointer("supple_tissue", tissues)
+        return made
+
     def _divided(self, parts: NDArray[np.uint16], of_element: NDArray[np.uint16]) -> Scene:
         """Another one, in which each tissue of `parts` is there once more, behind the others."""
         made = copy.copy(self)

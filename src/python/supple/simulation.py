@@ -475,7 +475,8 @@ class Simulation:
     @_one_at_a_time
     def ablate(self, elements: ArrayLike, material: Material, seconds: float) -> None:
         """Lets the constants of some elements, as numbers or as a mask, change evenly to those of a material of the same law over so many
-        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities, relaxation and fibres stay. See `exchange`."""
+        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities, relaxation and fibres stay. A `reset` or an
+        `exchange` ends it where it is. See `exchange`."""
         ablated(self, elements, material, seconds)
 
     # Supports.
@@ -697,15 +698,21 @@ class Simulation:
     @_one_at_a_time
     def restore(self, saved: bytes) -> None:
         """Puts the state back; steps go on from there, a network's after a lead-in. Exact steps of a given length without pulls go on to the
-        bit; pulls are turned as the tissue is now."""
+        bit; pulls are turned as the tissue is now. The motion alone goes back: loads and tissue stay as they are now, without what was
+        removed and with what was ablated. An ablation that began later than the state's time ends where it is; another goes on from there
+        when its next stage is due. To have the tissue of that time as well, keep its `scene` and `exchange` it before."""
         data = np.frombuffer(saved, np.uint8)
         library.checked(lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data)), what="restore")
+        self._ablations = [ablation for ablation in self._ablations if ablation.start <= self.time]
         self._prepare_again()
 
     @_one_at_a_time
     def reset(self) -> None:
-        """Back to rest, at time zero; targets of pulls are where they were to go."""
+        """Back to rest, at time zero; targets of pulls are where they were to go. The motion alone goes back: loads and tissue stay as they
+        are now, without what was removed and with what was ablated, and an ablation under way ends where it is. To have the tissue of the
+        start as well, keep its `scene` and `exchange` it before."""
         library.checked(lib.supple_state_reset(self._state))
+        self._ablations = []
         for group in self._pull_groups:
             group.times = (0.0, 0.0)
         self._set_pulls(self._pull_groups)
