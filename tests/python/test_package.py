@@ -91,6 +91,9 @@ def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
 
 
 REFUSED = [
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2.7, 1, 1]), r"cells \[2.7, 1, 1\]: they must be three whole numbers, at least 1"),
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2, 0, 1]), r"cells \[2, 0, 1\]"),
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], 3), "cells 3: they must be three"),
     (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets.astype(float)), "integers of shape"),
     (lambda mesh, soft: supple.Mesh(mesh.points[:, :2], mesh.tets), r"points: its shape is \(144, 2\)"),
     (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets + 100), "element .* has nodes .* there are 144 nodes"),

@@ -125,3 +125,14 @@ def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> N
     if len(bad):
         raise errors.InputError(f"{what}: entry {bad[0]} is {kind} {array[bad[0]]}, there are {nodes} {kind}s")
     return array.astype(np.uint32)
+
+
+def cells_of(given: Any) -> tuple[int, int, int]:
+    """How many cells there are along x, y and z."""
+    try:
+        array = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape != (3,) or not ((array >= 1.0) & (array < 1 << 31) & (array == np.floor(array))).all():
+        raise errors.InputError(f"cells {given!r}: they must be three whole numbers, at least 1")
+    return int(array[0]), int(array[1]), int(array[2])

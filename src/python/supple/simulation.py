@@ -191,7 +191,7 @@ class Simulation:
         settings.steps, settings.guard, settings.lead_in = _STEPS[method], int(guard), lead_in
         # Forces on nodes, and those of a traction.
         settings.damping, settings.forces, settings.motions = damping, 2 * nodes, nodes
-        settings.fallback, settings.cells = int(fallback), cells or (0, 0, 0)
+        settings.fallback, settings.cells = int(fallback), (0, 0, 0) if cells is None else library.cells_of(cells)
         if most_steps is not None:
             if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
                 raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
