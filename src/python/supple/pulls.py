@@ -153,5 +153,8 @@ def wanted_of(points: ArrayLike, radius: float, stiffness: ArrayLike, most: floa
     if most is not None and not most > 0.0:
         raise InputError(f"most {most}: it must be a positive number, N, or infinite for no limit")
     directions = np.zeros_like(rows) if along is None else library.vectors(along, "along", len(rows))
+    bad = np.flatnonzero(~directions.any(axis=1))
+    if along is not None and len(bad):
+        raise InputError(f"along: row {bad[0]} is {directions[bad[0]].tolist()}, no direction; for pulls along all directions leave it out")
     stiff = np.broadcast_to(np.asarray(stiffness, np.float32), (len(rows),)).copy()
     return Wanted(rows, np.full_like(rows, np.nan), radius, stiff, most or 0.0, directions)
