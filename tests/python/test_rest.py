@@ -155,6 +155,45 @@ def test_tractions_let_go_of_what_is_removed(way):
     cut.remove([0])
 
 
+def test_pressures_and_tractions_are_on_triangles_of_the_boundary_each_once():
+    simulation = held()
+    mesh, pressed = simulation.scene.mesh, lambda triangles: simulation.add_pressure(triangles, 10.0)
+    pulled = lambda triangles: simulation.set_tractions(triangles, [0.0, 0.0, 10.0])
+    sides = mesh.boundary()
+    of_boundary = {tuple(sorted(nodes)) for nodes in sides.tolist()}
+    faces = [nodes for tet in mesh.tets.tolist() for nodes in (tet[:3], tet[1:])]
+    inside = next(nodes for nodes in faces if tuple(sorted(nodes)) not in of_boundary)
+    for load in (pressed, pulled):
+        load(np.roll(sides, 1, axis=1))
+        for triangles, words in [
+            ([*sides[:5].tolist(), inside], r"triangles: row 5, \[.*\], is none of the boundary of the tissue"),
+            ([*sides[:5], sides[2]], r"triangles: row 5, \[.*\], is the same as row 2: each is given once"),
+            ([*sides[:5], np.roll(sides[2], 2)], "row 5, .* is the same as row 2"),
+            ([[0, 0, 0]], "row 0, .* is none of the boundary"),
+            (sides.ravel(), r"triangles: their shape is \(\d+,\), it must be \(k, 3\)"),
+        ]:
+            with pytest.raises(supple.InputError, match=words):
+                load(triangles)
+    # A traction has a direction of its own.
+    pulled(sides[:, ::-1])
+    for triangles, words in [(sides[:, ::-1], r"row 0, .* is seen from inside: .* triangles\[:, ::-1\] turns all"), ([], "there are none")]:
+        with pytest.raises(supple.InputError, match=words):
+            pressed(triangles)
+    # What is removed has no boundary; the cut has.
+    middle = mesh.points[mesh.tets].mean(axis=1)
+    end = sides[(mesh.points[sides][:, :, 2] > 0.0599).all(axis=1)]
+    simulation.clear_pressures()
+    simulation.remove(middle[:, 2] > 0.045)
+    for load in (pressed, pulled):
+        with pytest.raises(supple.InputError, match="row 0, .* is none of the boundary of the tissue that is left"):
+            load(end)
+        cut = supple.Mesh(mesh.points, mesh.tets[middle[:, 2] < 0.045]).boundary()
+        load(cut[np.isclose(mesh.points[cut][:, :, 2], 0.045).all(axis=1)])
+    # With all tissue back it is inside.
+    simulation.exchange(held().scene)
+    assert not len(simulation._tractions) and not len(simulation._pressures[0]._numbers) and simulation.settle(TOLERANCE).at_rest
+
+
 def test_pressures_are_added_changed_and_cleared():
     simulation = held(damping=20.0)
     mesh = simulation.scene.mesh

@@ -60,32 +60,21 @@ def exchanged(simulation: Simulation, scene: Scene) -> None:
     library.checked(lib.supple_sim_carry_on(sim, simulation._sim, settings, error), error, "exchange")
     if contact is not None and contact.list:
         library.checked(lib.supple_set_contact(objects.loads, contact.raw))
-    lost = bool(scene._removed.sum() != simulation.scene._removed.sum())
     simulation.scene, simulation._contact = scene, contact
     simulation._adopt(memory, sim)
-    if lost:
-        _load_what_is_left(simulation)
+    _load_what_is_left(simulation)
 
 
 def _load_what_is_left(simulation: Simulation) -> None:
-    """Pressures and tractions lose the triangles that are no face of an element any more; a pressure whose surface is open then does not fill."""
+    """Pressures and tractions lose the triangles that are not of the boundary any more; a pressure whose surface is open then does not fill."""
     scene = simulation.scene
-    if not simulation._pressures and simulation._traction is None:
-        return
-    tets = np.sort(scene.mesh.tets[scene._removed == 0], axis=1)
-    faces = np.concatenate([tets[:, corners] for corners in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3])])
-    left = {tuple(face) for face in faces.tolist()}
-
-    def are_left(triangles: NDArray[np.uint32]) -> NDArray[np.bool_]:
-        return np.array([tuple(sorted(nodes)) in left for nodes in triangles.tolist()], bool)
-
     if simulation._traction is not None:
         triangles, pascal, ramp = simulation._traction
-        simulation.set_tractions(triangles[are_left(triangles)], pascal, ramp)
+        simulation.set_tractions(triangles[scene._are_of_boundary(triangles)], pascal, ramp)
     if simulation._pressures:
         for one in simulation._pressures:
             triangles = one._numbers.reshape(-1, 3)
-            is_left = are_left(triangles)
+            is_left = scene._are_of_boundary(triangles)
             if not is_left.all():
                 one._numbers, one._filling = triangles[is_left].ravel(), (0.0, 0.0)
         simulation._set_pressures(simulation._pressures)

@@ -201,7 +201,8 @@ class Scene:
     def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)
-        made.__dict__.pop("_boundary", None)
+        for of_elements in ("_boundary", "_triangles"):
+            made.__dict__.pop(of_elements, None)
         made._removed = removed
         made._build()
         return made
@@ -255,6 +256,36 @@ class Scene:
         return boundary_of(np.ascontiguousarray(self.mesh.tets[self._removed == 0]))
 
     @functools.cached_property
+    def _triangles(self) -> set[tuple[int, ...]]:
+        """Those of the boundary, each from its first node on."""
+        return set(_from_first(self._boundary))
+
+    def _are_of_boundary(self, triangles: NDArray[np.uint32]) -> NDArray[np.bool_]:
+        """Whether each is of the boundary, seen from either side."""
+        return np.array([not {(a, b, c), (a, c, b)}.isdisjoint(self._triangles) for a, b, c in _from_first(triangles)], bool)
+
+    def _triangles_of(self, given: ArrayLike, *, outward: bool) -> NDArray[np.uint32]:
+        """Triangles of the boundary, (k, 3), each once; if it matters, seen from outside."""
+        array = np.asarray(given)
+        if array.size and (array.ndim != 2 or array.shape[1] != 3):
+            raise InputError(f"triangles: their shape is {array.shape}, it must be (k, 3)")
+        triangles = library.node_numbers(array.ravel(), len(self.mesh.points), "triangles").reshape(-1, 3)
+        seen = dict[tuple[int, ...], int]()
+        for row, (a, b, c) in enumerate(_from_first(triangles)):
+            is_outward = (a, b, c) in self._triangles
+            first = seen.setdefault((a, b, c) if is_outward else (a, c, b), row)
+            if first == row and (is_outward or (not outward and (a, c, b) in self._triangles)):
+                continue
+            if first != row:
+                wrong = f"is the same as row {first}: each is given once"
+            elif (a, c, b) in self._triangles:
+                wrong = "is seen from inside: take it as Mesh.boundary tells it; triangles[:, ::-1] turns all"
+            else:
+                wrong = f"is none of the boundary of the tissue{' that is left' if self._removed.any() else ''}"
+            raise InputError(f"triangles: row {row}, {triangles[row].tolist()}, {wrong}", index=row)
+        return triangles
+
+    @functools.cached_property
     def _edge(self) -> float:
         """Mean length of the elements' edges, m."""
         corners = self.mesh.points[self.mesh.tets].astype(np.float64)
@@ -278,6 +309,12 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<supple.Scene: {self.mesh!r}, {self.material!r}, {self.element}>"
+
+
+def _from_first(triangles: NDArray[np.uint32]) -> list[tuple[int, ...]]:
+    """Each from its node of the lowest number on, the way it goes round."""
+    first = triangles.argmin(axis=1)[:, None] if len(triangles) else np.zeros((0, 1), np.int64)
+    return [tuple(nodes) for nodes in np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1).tolist()]
 
 
 def _directions_of(directions: ArrayLike | None, fibres: NDArray[np.void], of_element: NDArray[np.uint16]) -> NDArray[np.float32]:

@@ -213,7 +213,7 @@ class Simulation:
         self._pull_memory: PullMemory | None = None
         self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
-        self._traction: tuple[NDArray[np.uint32], ArrayLike, float] | None = None
+        self._traction: tuple[NDArray[np.uint32], NDArray[np.float32], float] | None = None
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self.gravity = gravity
@@ -252,13 +252,11 @@ class Simulation:
 
     @_one_at_a_time
     def set_tractions(self, triangles: ArrayLike, pascal: ArrayLike, ramp: float = 0.0) -> None:
-        """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, a force per area at rest
+        """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, each once, a force per area at rest
         (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves; what is
         removed it lets go of."""
-        corners, points = np.asarray(triangles), self.scene.mesh.points
-        if corners.size and (corners.ndim != 2 or corners.shape[1] != 3):
-            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
-        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        points, corners = self.scene.mesh.points, self.scene._triangles_of(triangles, outward=False)
+        numbers = corners.ravel()
         if np.shape(pascal) != (3,):
             raise InputError(f"pascal: {pascal!r}, it must be three numbers, Pa")
         found, error = np.zeros(len(numbers), _FORCE), library.new_error()
@@ -273,7 +271,7 @@ class Simulation:
         np.add.at(newton, place, found["newton"])
         rows["node"], rows["newton"], rows["ramp"] = nodes, newton, ramp
         self._set_forces(self._forces, rows)
-        self._traction = numbers.reshape(-1, 3), pascal, ramp
+        self._traction = corners, np.array(pascal, np.float32), ramp
 
     def _set_forces(self, forces: NDArray[np.void], tractions: NDArray[np.void]) -> None:
         error, rows = library.new_error(), np.concatenate([forces, tractions])
@@ -282,13 +280,12 @@ class Simulation:
 
     @_one_at_a_time
     def add_pressure(self, triangles: ArrayLike, pascal: float, ramp: float = 0.0) -> Pressure:
-        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as of
-        `Mesh.boundary`. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
+        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as
+        `Mesh.boundary` tells them, seen from outside, each once. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
         the first `ramp` s of the simulation. It is changed through what this gives."""
-        corners, points = np.asarray(triangles), self.scene.mesh.points
-        if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
-            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
-        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        numbers = self.scene._triangles_of(triangles, outward=True).ravel()
+        if not len(numbers):
+            raise InputError("triangles: there are none")
         added = Pressure(self, len(self._pressures), numbers)
         added._pascal, added._ramp = pascal, ramp
         self._set_pressures([*self._pressures, added])
