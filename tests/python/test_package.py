@@ -204,6 +204,50 @@ def test_steps_are_refused_in_words(soft):
     assert simulation.advance(1e-3).ok
 
 
+# Of another kind than asked for, or beyond what can be: what is refused, and its words, which name it and its value.
+SIMULATED = [
+    (lambda scene, sim: supple.Simulation(scene.mesh), "scene <supple.Mesh: .*: it must be a Scene"),
+    (lambda scene, sim: supple.Scene("lobe.msh", scene.material), "mesh 'lobe.msh': it must be a Mesh"),
+    (lambda scene, sim: supple.Scene(scene.mesh, 1e4), "material 10000.0: it must be a Material"),
+    (lambda scene, sim: supple.Material.from_moduli("1e4", 0.45, density=1e3), "Young's modulus '1e4': it must be a number"),
+    (lambda scene, sim: supple.Material("neo-hookean", c=1e3, d=[1e4], density=1e3), r"d \[10000.0\]: it must be a number"),
+    (lambda scene, sim: supple.Simulation(scene, damping=-1), "damping -1: it must be zero or a positive number, 1/s"),
+    (lambda scene, sim: supple.Simulation(scene, lead_in=-1), "lead_in -1: it must be zero or a positive number, s"),
+    (lambda scene, sim: supple.Simulation(scene, step="auto"), "step 'auto': it must be a number"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(-1, 1, 1)), r"cells \(-1, 1, 1\): they must be three whole numbers, at least 1"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(1.5, 1, 1)), r"cells \(1.5, 1, 1\)"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=4), "cells 4"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(100, 100, 100)), r"long, cells \(100, 100, 100\): "),
+    (lambda scene, sim: supple.Simulation(scene, most_steps="all"), "most_steps 'all': it must be a number"),
+    (lambda scene, sim: sim.advance("a"), "seconds 'a': it must be a number"),
+    (lambda scene, sim: sim.settle(None), "metre None: it must be a number"),
+    (lambda scene, sim: sim.settle(1e-5, most_steps=1e12), "most_steps 1000000000000.0: it must be a whole number"),
+    (lambda scene, sim: sim.set_forces([1], [1, 0, 0], ramp=[0.1, 0.2]), r"ramp \[0.1, 0.2\]: it must be a number"),
+    (lambda scene, sim: sim.set_motions([1], [1, 0, 0], ramp=-1.0), "ramp -1.0: it must be zero or a positive number, s"),
+    (lambda scene, sim: sim.set_tractions(scene.mesh.boundary(), [1, 0, 0], ramp=np.nan), "ramp nan: it must be zero or a positive number, s"),
+    (lambda scene, sim: sim.add_pressure(scene.mesh.boundary(), [1, 2]), r"pascal \[1, 2\]: it must be a number"),
+    (lambda scene, sim: sim.pull([[0.01, 0.01, 0.03]], stiffness=[1, 2]), r"stiffness \[1, 2\]: it must be one number, N/m, or one for each of 1 points"),
+    (lambda scene, sim: sim.pull([[0.01, 0.01, 0.03]], radius="1 cm"), "radius '1 cm': it must be a number"),
+    (lambda scene, sim: sim.set_instruments(supple.Instrument.sphere(0.01, [0, 0, 0.2])), "instruments: Instrument is given, a list of Instrument is needed"),
+    (lambda scene, sim: sim.set_instruments([scene]), "instruments: entry 0 is <supple.Scene: "),
+    (lambda scene, sim: sim.set_instruments([supple.Instrument.sphere("1", [0, 0, 0.2])]), "radius '1': it must be a number"),
+    (lambda scene, sim: sim.exchange(scene.mesh), "exchange with <supple.Mesh: .*: it must be a Scene"),
+    (lambda scene, sim: sim.ablate([0], 1e4, 1.0), "ablate to 10000.0: it must be a Material"),
+    (lambda scene, sim: sim.reaction([0, 20]), "reaction: entry 1 is node 20, which the scene neither fixes nor moves"),
+]
+
+
+@pytest.mark.parametrize(("attempt", "words"), SIMULATED)
+def test_what_is_refused_is_named_with_its_value(soft, attempt, words):
+    mesh = bar()
+    scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6)
+    simulation = supple.Simulation(scene, damping=20.0)
+    with pytest.raises(supple.InputError, match=words) as caught:
+        attempt(scene, simulation)
+    print(caught.value)
+    assert simulation.advance(1e-3).ok and not simulation.displacements.any()
+
+
 def test_forces_on_320_nodes_take_less_than_50_us(lobe, liver):
     simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03))
     nodes, newton = np.arange(320), np.full((320, 3), 1e-5)

@@ -86,6 +86,31 @@ def pointer(kind: str, array: NDArray[Any]) -> Any:
     return ffi.cast(f"{kind} *", array.ctypes.data) if array.size else ffi.NULL
 
 
+def number(value: Any, what: str) -> float:
+    """A number, whatever its size; anything else is refused with its name."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        array = np.zeros(0)
+    if array.shape != () or array.dtype.kind not in "biuf":
+        raise errors.InputError(f"{what} {value!r}: it must be a number")
+    return float(array)
+
+
+def not_negative(value: Any, what: str, unit: str) -> float:
+    """A finite number, zero or more."""
+    if not 0.0 <= number(value, what) < np.inf:
+        raise errors.InputError(f"{what} {value}: it must be zero or a positive number, {unit}")
+    return float(value)
+
+
+def whole(value: Any, what: str, most: int) -> int:
+    """A whole number from 1 on."""
+    if not (1.0 <= number(value, what) <= most and int(value) == value):
+        raise errors.InputError(f"{what} {value}: it must be a whole number, at least 1")
+    return int(value)
+
+
 def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.float32]:
     """Finite float32 vectors of shape (n, 3) from anything like them; one vector stands for `count` of them."""
     try:

@@ -49,8 +49,10 @@ def made_of(scene: Scene, settings: Any, what: str) -> tuple[library.Memory, Any
 
 def exchanged(simulation: Simulation, scene: Scene) -> None:
     """See `Simulation.exchange`."""
+    if not isinstance(scene, Scene):
+        raise InputError(f"exchange with {scene!r}: it must be a Scene")
     settings, contact, error = simulation._settings, simulation._contact, library.new_error()
-    memory, sim = made_of(scene, settings, simulation.method)
+    memory, sim = made_of(scene, settings, simulation._what)
     objects = ffi.new("supple_sim_objects *")
     library.checked(lib.supple_sim_describe(sim, objects))
     if contact is not None:
@@ -84,9 +86,11 @@ def ablated(simulation: Simulation, elements: ArrayLike, material: Material, sec
     """See `Simulation.ablate`."""
     scene = simulation.scene
     numbers = library.node_numbers(elements, len(scene.mesh.tets), "ablate", "element")
+    if not isinstance(material, Material):
+        raise InputError(f"ablate to {material!r}: it must be a Material")
     if material._number != scene._law:
         raise InputError(f"ablate: the material is {material.law}, another law than that of the tissue")
-    if not (np.isfinite(seconds) and seconds >= 0.0):
+    if not 0.0 <= library.number(seconds, "seconds") < np.inf:
         raise InputError(f"ablate within {seconds} s: it must be zero or more")
     if not len(numbers):
         raise InputError("ablate: there are no elements")

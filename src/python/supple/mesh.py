@@ -27,7 +27,7 @@ class Mesh:
     """
 
     def __init__(self, points: ArrayLike, tets: ArrayLike, scale: float = 1.0, regions: ArrayLike | None = None) -> None:
-        if not (np.isfinite(scale) and scale > 0.0):
+        if not 0.0 < library.number(scale, "scale") < np.inf:
             raise InputError(f"scale {scale}: it must be a positive number")
         self.points: NDArray[np.float32] = library.vectors(np.asarray(points, np.float64) * scale, "points")
         array = np.asarray(tets)

@@ -55,11 +55,11 @@ class Material:
     ) -> None:
         if law not in LAWS:
             raise InputError(f"law {law!r}: there are {', '.join(LAWS)}")
-        self.law, self.density = law, float(density)
+        self.law, self.density = law, library.number(density, "density")
         self._number, names = LAWS[law]
         if set(constants) != set(names):
             raise InputError(f"constants of {law}: {', '.join(constants) or 'none'} are given, {', '.join(names)} are needed")
-        self.constants = {name: float(constants[name]) for name in names}
+        self.constants = {name: library.number(constants[name], name) for name in names}
         self.prony = _terms_of(prony)
         self.fibres, self.sheets, self.coupling = (_term_of(each, name) for each, name in zip((fibres, sheets, coupling), _TERMS))
 
@@ -77,7 +77,8 @@ class Material:
     ) -> Material:
         """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus.
         Those are of the tissue without its fibres."""
-        if not -1.0 < poisson < 0.5:
+        library.number(young, "Young's modulus")
+        if not -1.0 < library.number(poisson, "Poisson's ratio") < 0.5:
             raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
         c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))
         return cls("neo-hookean", c=c, d=d, density=density, prony=prony, fibres=fibres, sheets=sheets, coupling=coupling)
@@ -149,6 +150,8 @@ class Scene:
         removed: ArrayLike = (),
         directions: ArrayLike | None = None,
     ) -> None:
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"mesh {mesh!r}: it must be a Mesh")
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
@@ -231,6 +234,8 @@ class Scene:
         regions, of_element = self.mesh.regions, np.zeros(len(self.mesh.tets), np.uint16)
         if isinstance(material, Material):
             materials = [material]
+        elif not (isinstance(material, Mapping) and all(isinstance(each, Material) for each in material.values())):
+            raise InputError(f"material {material!r}: it must be a Material, or one for each region: {{1: liver, 7: vessel}}")
         else:
             if regions is None or not material:
                 raise InputError(f"materials of regions: {'the mesh has no regions' if regions is None else 'there are none'}")
