@@ -1918,7 +1918,8 @@ supple_status supple_set_contact(supple_loads *loads,
 
 /**
  * Writes the forces of a uniform traction on triangles of the boundary at rest, three for each, for supple_set_forces
- * among others: a third of traction times area to each corner. Their direction stays while the body moves.
+ * among others: a third of traction times area to each corner. Their direction stays while the body moves. Where elements are
+ * removed they go on to act on the nodes that are left: make them again, of the triangles that are left.
  *
  * @param points of all `nodes` of the scene at rest, m, three coordinates each.
  * @param triangles three nodes of each of `count` triangles, as of supple_boundary.
@@ -2941,7 +2942,8 @@ supple_status supple_sim_set_tissues(supple_sim *sim,
  * displacements, velocities, time, gravity, forces, motions, pulls, and where it has a surface the instruments with what
  * they hold; what stays of the tissue keeps its momentum and what it remembers, and the energy balance begins anew. It takes over pressures
  * where no element goes. Where some do there is none: the triangles would go on to press the surface that is gone, so set
- * one up on what is left of it, with or without the cut (supple_pressure_init, supple_set_pressure). Nodes that belong to no
+ * one up on what is left of it, with or without the cut (supple_pressure_init, supple_set_pressure). Forces stay as they are, those
+ * that supple_traction has made of triangles that are gone as well: make them again. Nodes that belong to no
  * element any more stay in all arrays, held where they are; pulls and instruments let go of them. The other simulation
  * is only read, may go on, and its memory be used for the next exchange; but the pulls are an object of both, so where it goes
  * on these have let go in it as well. What is refused changes none of this. supple_sim_setup, which takes longest, may run on another thread

@@ -1041,6 +1041,7 @@ inline status loads::set_pressure(const pressure &with) const noexcept {
 }
 
 // The forces of a uniform traction, Pa, on triangles of the boundary of a body of these points, for loads::set_forces: three for each.
+// Where elements are removed make them again, of the triangles that are left.
 inline result<std::size_t> traction(span<const float> points, span<const std::uint32_t> triangles, const std::array<float, 3> &pascal,
                                     float ramp, span<force> out) noexcept {
     result<std::size_t> count{status::ok, detail::nothing(status::ok), triangles.size() / 3 * 3};

@@ -390,7 +390,8 @@ pub fn ramp_factor(time: f64, ramp: f32) -> f32 {
 }
 
 /// Nodal forces of a uniform traction (Pa) on boundary triangles at rest: a third of traction times area
-/// to each corner. The direction stays as given while the body moves (a dead load).
+/// to each corner. The direction stays as given while the body moves (a dead load). Where elements are removed they go on to
+/// act on the nodes that are left: make them again, of the triangles that are left.
 pub fn traction<'a>(
     points: &'a [[f32; 3]],
     triangles: &'a [[u32; 3]],

@@ -6,7 +6,8 @@ use super::status::{short, supple_error, supple_status};
 use supple_status::*;
 
 /// Writes the forces of a uniform traction on triangles of the boundary at rest, three for each, for supple_set_forces
-/// among others: a third of traction times area to each corner. Their direction stays while the body moves.
+/// among others: a third of traction times area to each corner. Their direction stays while the body moves. Where elements are
+/// removed they go on to act on the nodes that are left: make them again, of the triangles that are left.
 ///
 /// @param points of all `nodes` of the scene at rest, m, three coordinates each.
 /// @param triangles three nodes of each of `count` triangles, as of supple_boundary.

@@ -107,7 +107,7 @@ def test_a_traction_gives_its_impulse(soft):
     for wrong, words in [(([[0, 1]], [0, 0, 1]), r"\(k, 3\)"), (([[0, 1, 999]], [0, 0, 1]), "node 999"), ((top, 5.0), "three numbers, Pa")]:
         with pytest.raises(supple.InputError, match=words):
             simulation.set_tractions(*wrong)
-    with pytest.raises(supple.InputError, match="tractions: .* entry 0, value -1"):
+    with pytest.raises(supple.InputError, match="ramp -1.0: it must be zero or a positive number, s"):
         simulation.set_tractions(top, [0.0, 0.0, 1.0], ramp=-1.0)
     simulation.set_tractions([], [0.0, 0.0, 0.0])
 
@@ -158,7 +158,7 @@ def test_supports_react_with_the_weight(soft):
         assert force.resolved and force.newton[2] == pytest.approx(weight, rel=0.02) and abs(force.newton[:2]).max() < 0.02 * weight
         simulation.reset()
         assert reaction.force() is None
-    with pytest.raises(supple.InputError, match="reaction: .* node 0"):
+    with pytest.raises(supple.InputError, match="reaction: entry 0 is node 0, which the scene neither fixes nor moves"):
         simulation.reaction([0])
 
 
@@ -196,8 +196,12 @@ def test_a_report_tells_what_c_tells(lobe, liver):
     assert report.largest_estimate > report.estimate > 0.0 and 0 <= report.worst_node < len(lobe.points)
     assert 0.0 < report.shortest <= report.longest < 1.0 / 60.0 + 1e-6 and report.available_energy > report.kinetic_energy > 0.0
     assert report.added_mass > 0.0 and 0.0 < report.lattice_share <= 1.0 and report.energy_excess == 0.0 and report.outside == 0.0
-    with pytest.raises(supple.InputError):
+    with pytest.raises(supple.InputError, match=r"long, cells \(99, 99, 99\): "):
         supple.Simulation(scene, "long", cells=(99, 99, 99))
+    whole = supple.Simulation(scene, "long", damping=20.0, gravity=GRAVITY, cells=(2.0, 2.0, 2.0))
+    for _ in range(10):
+        whole.advance(1.0 / 60.0)
+    assert (whole.displacements == simulation.displacements).all()
 
 
 def test_contact_points_add_up_to_the_force(lobe, liver):

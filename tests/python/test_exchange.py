@@ -138,3 +138,88 @@ def test_what_cannot_be_is_refused_and_the_motion_goes_on(soft):
     for each in (simulation, undisturbed):
         each.advance(0.05)
     assert (simulation.displacements == undisturbed.displacements).all()
+
+
+def test_reset_and_restore_go_back_in_motion_alone(soft):
+    """The tissue stays as it is: an ablation under way ends where it is, unless it had begun by the time that is restored."""
+    mesh, stiff = bar(cells=(2, 2, 6)), supple.Material.from_moduli(15000.0, 0.45, density=1000.0)
+    everything = np.ones(len(mesh.tets), bool)
+    made = lambda: supple.Simulation(scene_of(mesh, soft), damping=20.0, gravity=(2.0, 0.0, 0.0))
+    constants_of = lambda simulation: simulation.scene._tissues["constants"][1].copy()
+
+    def half_ablated():
+        simulation = made()
+        simulation.advance(0.1)
+        before = simulation.save()
+        simulation.advance(0.1)
+        simulation.ablate(everything, stiff, 0.2)
+        simulation.advance(0.05)
+        within = simulation.save()
+        for _ in range(5):
+            simulation.advance(0.01)
+        return simulation, before, within
+
+    for back in ("reset", "before", "within"):
+        simulation, before, within = half_ablated()
+        constants = constants_of(simulation)
+        assert soft.constants["c"] < constants[0] < stiff.constants["c"]
+        if back == "reset":
+            simulation.reset()
+            assert simulation.time == 0.0 and not simulation.displacements.any()
+        else:
+            simulation.restore({"before": before, "within": within}[back])
+        simulation.advance(0.01)
+        assert (constants_of(simulation) == constants).all(), back
+        for _ in range(60):
+            simulation.advance(0.01)
+        assert (constants_of(simulation) == constants).all() == (back != "within"), back
+        if back == "within":
+            assert constants_of(simulation)[0] == pytest.approx(stiff.constants["c"])
+    # What is removed stays so.
+    simulation = made()
+    simulation.remove(centres(mesh)[:, 2] > 0.04)
+    left = simulation.scene.facts["elements"]
+    simulation.reset()
+    assert simulation.scene.facts["elements"] == left < made().scene.facts["elements"]
+
+
+@pytest.mark.parametrize("method", ["exact", "long"])
+def test_a_scene_that_was_kept_has_the_tissue_of_its_time(soft, method):
+    mesh, stiff = bar(cells=(2, 2, 6)), supple.Material.from_moduli(15000.0, 0.45, density=1000.0)
+    made = lambda: supple.Simulation(scene_of(mesh, soft), method, step=2e-4 if method == "exact" else 2e-3, damping=20.0, gravity=(2.0, 0.0, 0.0))
+    simulation, undisturbed = made(), made()
+    for each in (simulation, undisturbed):
+        each.advance(0.1)
+    saved, as_it_was = simulation.save(), simulation.scene
+    simulation.ablate(np.ones(len(mesh.tets), bool), stiff, 0.0)
+    simulation.advance(0.1)
+    simulation.remove(centres(mesh)[:, 2] > 0.05)
+    simulation.advance(0.1)
+    simulation.exchange(as_it_was)
+    simulation.restore(saved)
+    for each in (simulation, undisturbed):
+        each.advance(0.1)
+    off = abs(simulation.displacements - undisturbed.displacements).max()
+    print(f"{method}: {1e6 * off:.3f} um")
+    assert off == 0.0 if method == "exact" else off < 1e-5
+
+
+def test_a_scene_in_the_middle_of_an_ablation_can_be_used_again(soft):
+    """Its constants are those that are reached."""
+    mesh, stiff = bar(cells=(2, 2, 6)), supple.Material.from_moduli(15000.0, 0.45, density=1000.0)
+    made = lambda scene: supple.Simulation(scene, damping=20.0, gravity=(2.0, 0.0, 0.0))
+    simulation = made(scene_of(mesh, soft))
+    simulation.ablate(np.ones(len(mesh.tets), bool), stiff, 0.2)
+    for _ in range(10):
+        simulation.advance(0.011)
+    again = made(simulation.scene)
+    simulation.exchange(simulation.scene)
+    # The latest stage began at 0.099 s: the ninth of twenty.
+    between = {name: 0.55 * soft.constants[name] + 0.45 * stiff.constants[name] for name in "cd"}
+    expected = made(scene_of(mesh, supple.Material("neo-hookean", **between, density=1000.0)))
+    for each in (simulation, again, expected):
+        assert each.settle(1e-6).at_rest
+    way = abs(expected.displacements).max()
+    offs = [abs(each.displacements - expected.displacements).max() for each in (simulation, again)]
+    print(f"{1e6 * max(offs):.2f} um of {1e3 * way:.3f} mm")
+    assert max(offs) < 3e-6 < 0.05 * way

@@ -90,6 +90,18 @@ def test_other_formats_are_meshios(tmp_path):
         assert (read.tets == mesh.tets).all() and read.points == pytest.approx(mesh.points, abs=1e-6)
 
 
+@pytest.mark.parametrize("name", ["bar.vtu", "bar.vtk", "bar.msh", "bar.ele"])
+def test_what_is_written_is_read_again_with_its_regions(tmp_path, capfd, name):
+    made = bar()
+    for regions in (None, np.arange(len(made.tets)) % 3 + 5):
+        mesh = supple.Mesh(made.points, made.tets, regions=regions)
+        mesh.write(tmp_path / name, np.full_like(made.points, 0.001))
+        read = supple.Mesh.read(tmp_path / name)
+        assert (read.tets == mesh.tets).all() and read.points == pytest.approx(mesh.points + 0.001, abs=1e-6)
+        assert read.regions is None if regions is None else (read.regions == regions).all()
+    assert "Warning" not in "".join(capfd.readouterr())
+
+
 @pytest.mark.parametrize("stop", [SystemExit(1), KeyError("x"), ValueError("no"), meshio.ReadError("no")])
 def test_meshio_never_ends_the_process(tmp_path, monkeypatch, stop):
     def fail(*_, **__):

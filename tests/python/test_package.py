@@ -91,6 +91,9 @@ def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
 
 
 REFUSED = [
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2.7, 1, 1]), r"cells \[2.7, 1, 1\]: they must be three whole numbers, at least 1"),
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2, 0, 1]), r"cells \[2, 0, 1\]"),
+    (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], 3), "cells 3: they must be three"),
     (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets.astype(float)), "integers of shape"),
     (lambda mesh, soft: supple.Mesh(mesh.points[:, :2], mesh.tets), r"points: its shape is \(144, 2\)"),
     (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets + 100), "element .* has nodes .* there are 144 nodes"),
@@ -115,6 +118,49 @@ def test_what_cannot_be_is_refused_in_words(soft, attempt, words):
     with pytest.raises(supple.InputError, match=words) as caught:
         attempt(bar(), soft)
     print(caught.value)
+
+
+def test_a_mask_of_integers_is_refused_wherever_nodes_are_chosen(soft):
+    mesh = bar()
+    for count in (1, 16, len(mesh.points) - 1):
+        mask = np.arange(len(mesh.points)) < count
+        elements = np.arange(len(mesh.tets)) < count
+        for kind in (np.uint8, np.int64):
+            simulation = supple.Simulation(supple.Scene(mesh, soft, fixed=[0]))
+            for attempt in (
+                lambda: supple.Scene(mesh, soft, fixed=mask.astype(kind)),
+                lambda: supple.Scene(mesh, soft, moved=mask.astype(kind)),
+                lambda: supple.Scene(mesh, soft, removed=elements.astype(kind)),
+                lambda: simulation.set_forces(mask.astype(kind), [0.0, 0.0, 1.0]),
+                lambda: simulation.set_motions(mask.astype(kind), [0.0, 0.0, 1.0]),
+                lambda: simulation.reaction(mask.astype(kind)),
+                lambda: simulation.remove(elements.astype(kind)),
+                lambda: simulation.ablate(elements.astype(kind), soft, 0.0),
+            ):
+                with pytest.raises(supple.InputError, match=r"zeros and ones .* mask.astype\(bool\) or numpy.flatnonzero\(mask\)"):
+                    attempt()
+    # Of a scene of two elements these are numbers.
+    pair = supple.Mesh([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0.01, 0.01, 0.01]], [[0, 1, 2, 3], [1, 2, 3, 4]])
+    with pytest.raises(supple.InputError, match="the scene: "):
+        supple.Scene(pair, soft, removed=[0, 1])
+
+
+def test_what_a_node_that_is_named_twice_means(soft):
+    """A support is one whatever it is named, forces add up, and a node cannot go to two places."""
+    mesh = bar(cells=(2, 2, 4))
+    base, tip = np.flatnonzero(mesh.points[:, 2] < 1e-6), len(mesh.points) - 1
+    once, twice = (supple.Simulation(supple.Scene(mesh, soft, fixed=nodes, moved=[tip])) for nodes in (base, [*base, *base]))
+    for simulation, nodes, newton in ((once, [tip - 1], 0.002), (twice, [tip - 1, tip - 1], 0.001)):
+        simulation.set_forces(nodes, [newton, 0.0, 0.0])
+        simulation.set_motions([tip, tip], [0.0, 0.001, 0.0])
+    reactions = once.reaction(base), twice.reaction([*base, *base])
+    for simulation in (once, twice):
+        simulation.advance(0.02)
+    assert abs(once.displacements).max() > 1e-4 and (once.displacements == twice.displacements).all()
+    one, other = (reaction.force() for reaction in reactions)
+    assert (one.newton == other.newton).all() and abs(one.newton).max() > 0.0
+    with pytest.raises(supple.InputError, match=f"motions: entries 0 and 1 are both node {tip}, .* only one of them can hold"):
+        once.set_motions([tip, tip], [[0.0, 0.001, 0.0], [0.0, 0.002, 0.0]])
 
 
 def test_steps_are_refused_in_words(soft):
@@ -156,6 +202,50 @@ def test_steps_are_refused_in_words(soft):
     simulation.set_motions([], np.zeros((0, 3)))
     simulation.set_forces([3], [1e-4, 0.0, 0.0])
     assert simulation.advance(1e-3).ok
+
+
+# Of another kind than asked for, or beyond what can be: what is refused, and its words, which name it and its value.
+SIMULATED = [
+    (lambda scene, sim: supple.Simulation(scene.mesh), "scene <supple.Mesh: .*: it must be a Scene"),
+    (lambda scene, sim: supple.Scene("lobe.msh", scene.material), "mesh 'lobe.msh': it must be a Mesh"),
+    (lambda scene, sim: supple.Scene(scene.mesh, 1e4), "material 10000.0: it must be a Material"),
+    (lambda scene, sim: supple.Material.from_moduli("1e4", 0.45, density=1e3), "Young's modulus '1e4': it must be a number"),
+    (lambda scene, sim: supple.Material("neo-hookean", c=1e3, d=[1e4], density=1e3), r"d \[10000.0\]: it must be a number"),
+    (lambda scene, sim: supple.Simulation(scene, damping=-1), "damping -1: it must be zero or a positive number, 1/s"),
+    (lambda scene, sim: supple.Simulation(scene, lead_in=-1), "lead_in -1: it must be zero or a positive number, s"),
+    (lambda scene, sim: supple.Simulation(scene, step="auto"), "step 'auto': it must be a number"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(-1, 1, 1)), r"cells \(-1, 1, 1\): they must be three whole numbers, at least 1"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(1.5, 1, 1)), r"cells \(1.5, 1, 1\)"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=4), "cells 4"),
+    (lambda scene, sim: supple.Simulation(scene, "long", cells=(100, 100, 100)), r"long, cells \(100, 100, 100\): "),
+    (lambda scene, sim: supple.Simulation(scene, most_steps="all"), "most_steps 'all': it must be a number"),
+    (lambda scene, sim: sim.advance("a"), "seconds 'a': it must be a number"),
+    (lambda scene, sim: sim.settle(None), "metre None: it must be a number"),
+    (lambda scene, sim: sim.settle(1e-5, most_steps=1e12), "most_steps 1000000000000.0: it must be a whole number"),
+    (lambda scene, sim: sim.set_forces([1], [1, 0, 0], ramp=[0.1, 0.2]), r"ramp \[0.1, 0.2\]: it must be a number"),
+    (lambda scene, sim: sim.set_motions([1], [1, 0, 0], ramp=-1.0), "ramp -1.0: it must be zero or a positive number, s"),
+    (lambda scene, sim: sim.set_tractions(scene.mesh.boundary(), [1, 0, 0], ramp=np.nan), "ramp nan: it must be zero or a positive number, s"),
+    (lambda scene, sim: sim.add_pressure(scene.mesh.boundary(), [1, 2]), r"pascal \[1, 2\]: it must be a number"),
+    (lambda scene, sim: sim.pull([[0.01, 0.01, 0.03]], stiffness=[1, 2]), r"stiffness \[1, 2\]: it must be one number, N/m, or one for each of 1 points"),
+    (lambda scene, sim: sim.pull([[0.01, 0.01, 0.03]], radius="1 cm"), "radius '1 cm': it must be a number"),
+    (lambda scene, sim: sim.set_instruments(supple.Instrument.sphere(0.01, [0, 0, 0.2])), "instruments: Instrument is given, a list of Instrument is needed"),
+    (lambda scene, sim: sim.set_instruments([scene]), "instruments: entry 0 is <supple.Scene: "),
+    (lambda scene, sim: sim.set_instruments([supple.Instrument.sphere("1", [0, 0, 0.2])]), "radius '1': it must be a number"),
+    (lambda scene, sim: sim.exchange(scene.mesh), "exchange with <supple.Mesh: .*: it must be a Scene"),
+    (lambda scene, sim: sim.ablate([0], 1e4, 1.0), "ablate to 10000.0: it must be a Material"),
+    (lambda scene, sim: sim.reaction([0, 20]), "reaction: entry 1 is node 20, which the scene neither fixes nor moves"),
+]
+
+
+@pytest.mark.parametrize(("attempt", "words"), SIMULATED)
+def test_what_is_refused_is_named_with_its_value(soft, attempt, words):
+    mesh = bar()
+    scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6)
+    simulation = supple.Simulation(scene, damping=20.0)
+    with pytest.raises(supple.InputError, match=words) as caught:
+        attempt(scene, simulation)
+    print(caught.value)
+    assert simulation.advance(1e-3).ok and not simulation.displacements.any()
 
 
 def test_forces_on_320_nodes_take_less_than_50_us(lobe, liver):

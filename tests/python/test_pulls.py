@@ -111,6 +111,7 @@ def test_what_cannot_be_is_refused(soft):
         ({"stiffness": 2e6}, "stiffness"),
         ({"most": np.nan}, "most nan"),
         ({"along": [[0.0, np.nan, 0.0]]}, "along"),
+        ({"along": [0.0, 0.0, 0.0]}, r"along: row 0 is \[0.0, 0.0, 0.0\], no direction"),
         ({"targets": [[0.0, 0.0]]}, r"their shape is \(1, 2\)"),
     ]:
         with pytest.raises(supple.InputError, match=words):

@@ -123,6 +123,77 @@ def test_pressures_let_go_of_what_is_removed():
     cut.add_pressure(sides[:1], 1.0)
 
 
+@pytest.mark.parametrize("way", ["remove", "exchange"])
+def test_tractions_let_go_of_what_is_removed(way):
+    """The end of a bar is pulled, and half of it goes: the supports bear traction times the area that is left."""
+    mesh = bar(cells=(4, 4, 8))
+    sides, middle = mesh.boundary(), mesh.points[mesh.tets].mean(axis=1)
+    end = sides[(mesh.points[sides][:, :, 2] > 0.0599).all(axis=1)]
+    gone, held = (middle[:, 2] > 0.045) & (middle[:, 0] > 0.01), mesh.points[:, 2] < 1e-6
+    material = supple.Material.from_moduli(3_000.0, 0.45, density=1000.0)
+    made = lambda **removed: supple.Simulation(supple.Scene(mesh, material, fixed=held, **removed), damping=20.0)
+    cut, never = made(), made(removed=gone)
+    cut.set_tractions(end, [0.0, 0.0, 20.0])
+    cut.set_forces([0], [0.0, 0.0, 1e-3])
+    assert cut.advance(0.1).ok
+    if way == "remove":
+        cut.remove(gone)
+    else:
+        cut.exchange(never.scene)
+    never.set_tractions(end[(mesh.points[end][:, :, 0] < 0.0101).all(axis=1)], [0.0, 0.0, 20.0])
+    for simulation in (cut, never):
+        assert simulation.settle(1e-6).at_rest
+    used = np.unique(mesh.tets[~gone])
+    off = np.linalg.norm(cut.displacements[used] - never.displacements[used], axis=1).max()
+    most = np.linalg.norm(never.displacements[used], axis=1).max()
+    print(f"{1e6 * off:.2f} um off of {1e3 * most:.3f} mm")
+    assert off < 2e-6 and most > 1e-4
+    # Nothing is left of the end.
+    cut.remove(np.flatnonzero(middle[:, 2] > 0.055))
+    assert cut.settle(1e-6).at_rest and np.linalg.norm(cut.displacements[used][mesh.points[used, 2] < 0.05], axis=1).max() < 2e-6
+    cut.set_tractions([], [0.0, 0.0, 0.0])
+    cut.remove([0])
+
+
+def test_pressures_and_tractions_are_on_triangles_of_the_boundary_each_once():
+    simulation = held()
+    mesh, pressed = simulation.scene.mesh, lambda triangles: simulation.add_pressure(triangles, 10.0)
+    pulled = lambda triangles: simulation.set_tractions(triangles, [0.0, 0.0, 10.0])
+    sides = mesh.boundary()
+    of_boundary = {tuple(sorted(nodes)) for nodes in sides.tolist()}
+    faces = [nodes for tet in mesh.tets.tolist() for nodes in (tet[:3], tet[1:])]
+    inside = next(nodes for nodes in faces if tuple(sorted(nodes)) not in of_boundary)
+    for load in (pressed, pulled):
+        load(np.roll(sides, 1, axis=1))
+        for triangles, words in [
+            ([*sides[:5].tolist(), inside], r"triangles: row 5, \[.*\], is none of the boundary of the tissue"),
+            ([*sides[:5], sides[2]], r"triangles: row 5, \[.*\], is the same as row 2: each is given once"),
+            ([*sides[:5], np.roll(sides[2], 2)], "row 5, .* is the same as row 2"),
+            ([[0, 0, 0]], "row 0, .* is none of the boundary"),
+            (sides.ravel(), r"triangles: their shape is \(\d+,\), it must be \(k, 3\)"),
+        ]:
+            with pytest.raises(supple.InputError, match=words):
+                load(triangles)
+    # A traction has a direction of its own.
+    pulled(sides[:, ::-1])
+    for triangles, words in [(sides[:, ::-1], r"row 0, .* is seen from inside: .* triangles\[:, ::-1\] turns all"), ([], "there are none")]:
+        with pytest.raises(supple.InputError, match=words):
+            pressed(triangles)
+    # What is removed has no boundary; the cut has.
+    middle = mesh.points[mesh.tets].mean(axis=1)
+    end = sides[(mesh.points[sides][:, :, 2] > 0.0599).all(axis=1)]
+    simulation.clear_pressures()
+    simulation.remove(middle[:, 2] > 0.045)
+    for load in (pressed, pulled):
+        with pytest.raises(supple.InputError, match="row 0, .* is none of the boundary of the tissue that is left"):
+            load(end)
+        cut = supple.Mesh(mesh.points, mesh.tets[middle[:, 2] < 0.045]).boundary()
+        load(cut[np.isclose(mesh.points[cut][:, :, 2], 0.045).all(axis=1)])
+    # With all tissue back it is inside.
+    simulation.exchange(held().scene)
+    assert not len(simulation._tractions) and not len(simulation._pressures[0]._numbers) and simulation.settle(TOLERANCE).at_rest
+
+
 def test_pressures_are_added_changed_and_cleared():
     simulation = held(damping=20.0)
     mesh = simulation.scene.mesh

@@ -86,6 +86,31 @@ def pointer(kind: str, array: NDArray[Any]) -> Any:
     return ffi.cast(f"{kind} *", array.ctypes.data) if array.size else ffi.NULL
 
 
+def number(value: Any, what: str) -> float:
+    """A number, whatever its size; anything else is refused with its name."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        array = np.zeros(0)
+    if array.shape != () or array.dtype.kind not in "biuf":
+        raise errors.InputError(f"{what} {value!r}: it must be a number")
+    return float(array)
+
+
+def not_negative(value: Any, what: str, unit: str) -> float:
+    """A finite number, zero or more."""
+    if not 0.0 <= number(value, what) < np.inf:
+        raise errors.InputError(f"{what} {value}: it must be zero or a positive number, {unit}")
+    return float(value)
+
+
+def whole(value: Any, what: str, most: int) -> int:
+    """A whole number from 1 on."""
+    if not (1.0 <= number(value, what) <= most and int(value) == value):
+        raise errors.InputError(f"{what} {value}: it must be a whole number, at least 1")
+    return int(value)
+
+
 def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.float32]:
     """Finite float32 vectors of shape (n, 3) from anything like them; one vector stands for `count` of them."""
     try:
@@ -104,7 +129,7 @@ def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.floa
 
 
 def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> NDArray[np.uint32]:
-    """Numbers of nodes, or of elements, from numbers or from a mask over all of them."""
+    """Numbers of nodes, or of elements, from numbers or from a mask over all of them. Repeated ones stay repeated."""
     array = np.asarray(selection)
     if array.dtype == bool:
         if array.shape != (nodes,):
@@ -115,7 +140,24 @@ def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> N
         return np.zeros(0, np.uint32)
     if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
         raise errors.InputError(f"{what}: numbers of {kind}s or a mask are needed, not {array.dtype} of shape {array.shape}")
+    # As numbers they would be those of the first two, many times.
+    if array.size == nodes and ((array == 0) | (array == 1)).all() and len(np.unique(array)) < nodes:
+        raise errors.InputError(
+            f"{what}: as many {array.dtype} zeros and ones as there are {kind}s are taken neither as numbers nor as a mask: "
+            "for a mask give mask.astype(bool) or numpy.flatnonzero(mask)"
+        )
     bad = np.flatnonzero((array < 0) | (array >= nodes))
     if len(bad):
         raise errors.InputError(f"{what}: entry {bad[0]} is {kind} {array[bad[0]]}, there are {nodes} {kind}s")
     return array.astype(np.uint32)
+
+
+def cells_of(given: Any) -> tuple[int, int, int]:
+    """How many cells there are along x, y and z."""
+    try:
+        array = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape != (3,) or not ((array >= 1.0) & (array < 1 << 31) & (array == np.floor(array))).all():
+        raise errors.InputError(f"cells {given!r}: they must be three whole numbers, at least 1")
+    return int(array[0]), int(array[1]), int(array[2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +49,10 @@ def made_of(scene: Scene, settings: Any, what: str) -> tuple[library.Memory, Any
 
 def exchanged(simulation: Simulation, scene: Scene) -> None:
     """See `Simulation.exchange`."""
+    if not isinstance(scene, Scene):
+        raise InputError(f"exchange with {scene!r}: it must be a Scene")
     settings, contact, error = simulation._settings, simulation._contact, library.new_error()
-    memory, sim = made_of(scene, settings, simulation.method)
+    memory, sim = made_of(scene, settings, simulation._what)
     objects = ffi.new("supple_sim_objects *")
     library.checked(lib.supple_sim_describe(sim, objects))
     if contact is not None:
@@ -61,34 +62,35 @@ def exchanged(simulation: Simulation, scene: Scene) -> None:
     library.checked(lib.supple_sim_carry_on(sim, simulation._sim, settings, error), error, "exchange")
     if contact is not None and contact.list:
         library.checked(lib.supple_set_contact(objects.loads, contact.raw))
-    lost = len(simulation._pressures) > 0 and bool(scene._removed.sum() != simulation.scene._removed.sum())
     simulation.scene, simulation._contact = scene, contact
     simulation._adopt(memory, sim)
-    if lost:
-        _press_what_is_left(simulation)
+    _load_what_is_left(simulation)
 
 
-def _press_what_is_left(simulation: Simulation) -> None:
-    """Pressures lose the triangles that are no face of an element any more; one that is open then does not fill."""
+def _load_what_is_left(simulation: Simulation) -> None:
+    """Pressures and tractions lose the triangles that are not of the boundary any more; a pressure whose surface is open then does not fill."""
     scene = simulation.scene
-    tets = np.sort(scene.mesh.tets[scene._removed == 0], axis=1)
-    faces = np.concatenate([tets[:, corners] for corners in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3])])
-    left = {tuple(face) for face in faces.tolist()}
-    for one in simulation._pressures:
-        triangles = one._numbers.reshape(-1, 3)
-        is_left = np.array([tuple(sorted(nodes)) in left for nodes in triangles.tolist()], bool)
-        if not is_left.all():
-            one._numbers, one._filling = triangles[is_left].ravel(), (0.0, 0.0)
-    simulation._set_pressures(simulation._pressures)
+    if simulation._traction is not None:
+        triangles, pascal, ramp = simulation._traction
+        simulation.set_tractions(triangles[scene._are_of_boundary(triangles)], pascal, ramp)
+    if simulation._pressures:
+        for one in simulation._pressures:
+            triangles = one._numbers.reshape(-1, 3)
+            is_left = scene._are_of_boundary(triangles)
+            if not is_left.all():
+                one._numbers, one._filling = triangles[is_left].ravel(), (0.0, 0.0)
+        simulation._set_pressures(simulation._pressures)
 
 
 def ablated(simulation: Simulation, elements: ArrayLike, material: Material, seconds: float) -> None:
     """See `Simulation.ablate`."""
     scene = simulation.scene
     numbers = library.node_numbers(elements, len(scene.mesh.tets), "ablate", "element")
+    if not isinstance(material, Material):
+        raise InputError(f"ablate to {material!r}: it must be a Material")
     if material._number != scene._law:
         raise InputError(f"ablate: the material is {material.law}, another law than that of the tissue")
-    if not (np.isfinite(seconds) and seconds >= 0.0):
+    if not 0.0 <= library.number(seconds, "seconds") < np.inf:
         raise InputError(f"ablate within {seconds} s: it must be zero or more")
     if not len(numbers):
         raise InputError("ablate: there are no elements")
@@ -127,6 +129,4 @@ def next_stage(simulation: Simulation) -> None:
     for ablation in due:
         ablation.stage = ablation.stage_at(now)
     simulation._ablations = [ablation for ablation in simulation._ablations if ablation.stage < _STAGES]
-    scene = copy.copy(simulation.scene)
-    scene._tissues = tissues
-    simulation.scene = scene
+    simulation.scene = simulation.scene._of_tissues(tissues)

@@ -124,10 +124,18 @@ class Rows:
     """Instruments as the library takes them, with the memory of their fields."""
 
     def __init__(self, instruments: list[Instrument]) -> None:
+        # Not by their values: a field is long.
+        if not isinstance(instruments, (list, tuple)):
+            raise InputError(f"instruments: {type(instruments).__name__} is given, a list of Instrument is needed")
+        for index, each in enumerate(instruments):
+            if not isinstance(each, Instrument):
+                raise InputError(f"instruments: entry {index} is {each!r}, an Instrument is needed", index=index)
         self.list, self.fields = list(instruments), list[NDArray[np.uint8]]()
         self.raw = ffi.new("supple_instrument[]", max(len(instruments), 1))
         for row, each in zip(self.raw, instruments):
-            row.shape, row.radius, row.length, row.friction = each.shape, each.radius, each.length, each.friction
+            row.shape = each.shape
+            for name in ("radius", "length", "friction"):
+                setattr(row, name, library.number(getattr(each, name), name))
             row.pose = _pose(each.position, each.rotation)[0]
             if each.distances is not None:
                 memory = library.Memory(len(each.distances))

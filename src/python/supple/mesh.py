@@ -27,7 +27,7 @@ class Mesh:
     """
 
     def __init__(self, points: ArrayLike, tets: ArrayLike, scale: float = 1.0, regions: ArrayLike | None = None) -> None:
-        if not (np.isfinite(scale) and scale > 0.0):
+        if not 0.0 < library.number(scale, "scale") < np.inf:
             raise InputError(f"scale {scale}: it must be a positive number")
         self.points: NDArray[np.float32] = library.vectors(np.asarray(points, np.float64) * scale, "points")
         array = np.asarray(tets)
@@ -42,9 +42,7 @@ class Mesh:
     @classmethod
     def box(cls, size: ArrayLike, cells: ArrayLike) -> Mesh:
         """A box from the origin to `size` (m), of so many cells along x, y, z, each cut into six tetrahedra around a diagonal."""
-        nx, ny, nz = (int(count) for count in np.asarray(cells).reshape(3))
-        if min(nx, ny, nz) < 1:
-            raise InputError(f"cells {cells!r}: one along each axis at least")
+        nx, ny, nz = library.cells_of(cells)
         lengths = np.asarray(size, np.float64).reshape(3)
         axes = [np.linspace(0.0, length, count + 1) for length, count in zip(lengths, (nx, ny, nz))]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -79,13 +77,21 @@ class Mesh:
         return cls(points[used], tets.reshape(-1, 4), scale, regions)
 
     def write(self, path: str | os.PathLike[str], displacements: ArrayLike | None = None) -> None:
-        """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`, in any format of meshio."""
+        """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`, and its regions
+        as cell data, in any format of meshio; `.msh` is Gmsh's, 2.2. `read` finds regions again in the formats that it reads itself."""
         points, data = self.points.astype(np.float64), {}
         if displacements is not None:
             moved = np.array(displacements, np.float64)
             points, data = points + moved, {"displacement": moved}
         cells = [("tetra", self.tets.astype(np.int64))]
-        _by_meshio(path, "write", lambda meshio: meshio.write(path, meshio.Mesh(points, cells, point_data=data)))
+        kind, values = None, {} if self.regions is None else {"region": [self.regions]}
+        if pathlib.Path(path).suffix.lower() == ".msh":
+            # To meshio these are Ansys's unless it is told. Region 0 is none.
+            tags = np.zeros(len(self.tets), np.int32) if self.regions is None else self.regions
+            kind, values = "gmsh22", {"gmsh:physical": [tags], "gmsh:geometrical": [tags]}
+        _by_meshio(
+            path, "write", lambda meshio: meshio.write(path, meshio.Mesh(points, cells, point_data=data, cell_data=values), kind)
+        )  # fmt: skip
 
     def boundary(self) -> NDArray[np.uint32]:
         """The triangles that belong to one tetrahedron only, of shape (k, 3), seen from outside."""

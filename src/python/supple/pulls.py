@@ -148,10 +148,16 @@ class Pulls:
 def wanted_of(points: ArrayLike, radius: float, stiffness: ArrayLike, most: float | None, along: ArrayLike | None) -> Wanted:
     """Checks what `Simulation.pull` is given."""
     rows = library.vectors(points, "points")
-    if not (np.isfinite(radius) and radius > 0.0):
+    if not 0.0 < library.number(radius, "radius") < np.inf:
         raise InputError(f"radius {radius}: it must be a positive number, m")
-    if most is not None and not most > 0.0:
+    if most is not None and not library.number(most, "most") > 0.0:
         raise InputError(f"most {most}: it must be a positive number, N, or infinite for no limit")
     directions = np.zeros_like(rows) if along is None else library.vectors(along, "along", len(rows))
-    stiff = np.broadcast_to(np.asarray(stiffness, np.float32), (len(rows),)).copy()
+    bad = np.flatnonzero(~directions.any(axis=1))
+    if along is not None and len(bad):
+        raise InputError(f"along: row {bad[0]} is {directions[bad[0]].tolist()}, no direction; for pulls along all directions leave it out")
+    try:
+        stiff = np.broadcast_to(np.asarray(stiffness, np.float32), (len(rows),)).copy()
+    except (TypeError, ValueError):
+        raise InputError(f"stiffness {stiffness!r}: it must be one number, N/m, or one for each of {len(rows)} points") from None
     return Wanted(rows, np.full_like(rows, np.nan), radius, stiff, most or 0.0, directions)

@@ -55,11 +55,11 @@ class Material:
     ) -> None:
         if law not in LAWS:
             raise InputError(f"law {law!r}: there are {', '.join(LAWS)}")
-        self.law, self.density = law, float(density)
+        self.law, self.density = law, library.number(density, "density")
         self._number, names = LAWS[law]
         if set(constants) != set(names):
             raise InputError(f"constants of {law}: {', '.join(constants) or 'none'} are given, {', '.join(names)} are needed")
-        self.constants = {name: float(constants[name]) for name in names}
+        self.constants = {name: library.number(constants[name], name) for name in names}
         self.prony = _terms_of(prony)
         self.fibres, self.sheets, self.coupling = (_term_of(each, name) for each, name in zip((fibres, sheets, coupling), _TERMS))
 
@@ -77,7 +77,8 @@ class Material:
     ) -> Material:
         """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus.
         Those are of the tissue without its fibres."""
-        if not -1.0 < poisson < 0.5:
+        library.number(young, "Young's modulus")
+        if not -1.0 < library.number(poisson, "Poisson's ratio") < 0.5:
             raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
         c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))
         return cls("neo-hookean", c=c, d=d, density=density, prony=prony, fibres=fibres, sheets=sheets, coupling=coupling)
@@ -149,6 +150,8 @@ class Scene:
         removed: ArrayLike = (),
         directions: ArrayLike | None = None,
     ) -> None:
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"mesh {mesh!r}: it must be a Mesh")
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
@@ -201,9 +204,17 @@ class Scene:
     def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)
-        made.__dict__.pop("_boundary", None)
+        for of_elements in ("_boundary", "_triangles"):
+            made.__dict__.pop(of_elements, None)
         made._removed = removed
         made._build()
+        return made
+
+    def _of_tissues(self, tissues: NDArray[np.void]) -> Scene:
+        """Another one of as many tissues of these constants, which are known to be good."""
+        made = copy.copy(self)
+        made._tissues, made._config = tissues, ffi.new("supple_scene_config *", self._config[0])
+        made._config.tissue = library.pointer("supple_tissue", tissues)
         return made
 
     def _divided(self, parts: NDArray[np.uint16], of_element: NDArray[np.uint16]) -> Scene:
@@ -223,6 +234,8 @@ class Scene:
         regions, of_element = self.mesh.regions, np.zeros(len(self.mesh.tets), np.uint16)
         if isinstance(material, Material):
             materials = [material]
+        elif not (isinstance(material, Mapping) and all(isinstance(each, Material) for each in material.values())):
+            raise InputError(f"material {material!r}: it must be a Material, or one for each region: {{1: liver, 7: vessel}}")
         else:
             if regions is None or not material:
                 raise InputError(f"materials of regions: {'the mesh has no regions' if regions is None else 'there are none'}")
@@ -248,6 +261,36 @@ class Scene:
         return boundary_of(np.ascontiguousarray(self.mesh.tets[self._removed == 0]))
 
     @functools.cached_property
+    def _triangles(self) -> set[tuple[int, ...]]:
+        """Those of the boundary, each from its first node on."""
+        return set(_from_first(self._boundary))
+
+    def _are_of_boundary(self, triangles: NDArray[np.uint32]) -> NDArray[np.bool_]:
+        """Whether each is of the boundary, seen from either side."""
+        return np.array([not {(a, b, c), (a, c, b)}.isdisjoint(self._triangles) for a, b, c in _from_first(triangles)], bool)
+
+    def _triangles_of(self, given: ArrayLike, *, outward: bool) -> NDArray[np.uint32]:
+        """Triangles of the boundary, (k, 3), each once; if it matters, seen from outside."""
+        array = np.asarray(given)
+        if array.size and (array.ndim != 2 or array.shape[1] != 3):
+            raise InputError(f"triangles: their shape is {array.shape}, it must be (k, 3)")
+        triangles = library.node_numbers(array.ravel(), len(self.mesh.points), "triangles").reshape(-1, 3)
+        seen = dict[tuple[int, ...], int]()
+        for row, (a, b, c) in enumerate(_from_first(triangles)):
+            is_outward = (a, b, c) in self._triangles
+            first = seen.setdefault((a, b, c) if is_outward else (a, c, b), row)
+            if first == row and (is_outward or (not outward and (a, c, b) in self._triangles)):
+                continue
+            if first != row:
+                wrong = f"is the same as row {first}: each is given once"
+            elif (a, c, b) in self._triangles:
+                wrong = "is seen from inside: take it as Mesh.boundary tells it; triangles[:, ::-1] turns all"
+            else:
+                wrong = f"is none of the boundary of the tissue{' that is left' if self._removed.any() else ''}"
+            raise InputError(f"triangles: row {row}, {triangles[row].tolist()}, {wrong}", index=row)
+        return triangles
+
+    @functools.cached_property
     def _edge(self) -> float:
         """Mean length of the elements' edges, m."""
         corners = self.mesh.points[self.mesh.tets].astype(np.float64)
@@ -271,6 +314,12 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<supple.Scene: {self.mesh!r}, {self.material!r}, {self.element}>"
+
+
+def _from_first(triangles: NDArray[np.uint32]) -> list[tuple[int, ...]]:
+    """Each from its node of the lowest number on, the way it goes round."""
+    first = triangles.argmin(axis=1)[:, None] if len(triangles) else np.zeros((0, 1), np.int64)
+    return [tuple(nodes) for nodes in np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1).tolist()]
 
 
 def _directions_of(directions: ArrayLike | None, fibres: NDArray[np.void], of_element: NDArray[np.uint16]) -> NDArray[np.float32]:

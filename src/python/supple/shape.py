@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _library as library
 from .errors import Diverged, InputError
 from .mesh import Mesh
 
@@ -39,7 +40,7 @@ def unloaded(image: Mesh, at_rest: Callable[[Mesh], ArrayLike], *, gap: float = 
     The places X of the nodes are those with x(X) = image: X - (x(X) - image) is repeated, which alone diverges where bodies sag far, with
     Anderson's mixture of the latest six (Journal of the ACM 12, 1965; Walker and Ni, SIAM Journal on Numerical Analysis 49, 2011).
     """
-    if not (np.isfinite(gap) and gap > 0.0):
+    if not 0.0 < library.number(gap, "gap") < np.inf:
         raise InputError(f"gap {gap}: it must be a positive number of metres")
     target, volumes = image.points.astype(np.float64), image.volumes
     points, tried, best, share = target, None, np.inf, 1.0

@@ -184,35 +184,42 @@ class Simulation:
             raise InputError(f"method {method!r}: there are {', '.join(METHODS)}")
         if method == "learned" and weights is None:
             raise InputError("learned steps need weights, the file of a network")
+        if not isinstance(scene, Scene):
+            raise InputError(f"scene {scene!r}: it must be a Scene")
         self.scene, self.method, self._step = scene, method, step
         nodes = len(scene.mesh.points)
         settings = self._settings = ffi.new("supple_settings *")
         library.checked(lib.supple_default_settings(settings))
-        settings.steps, settings.guard, settings.lead_in = _STEPS[method], int(guard), lead_in
+        settings.steps, settings.guard, settings.lead_in = _STEPS[method], int(guard), library.not_negative(lead_in, "lead_in", "s")
         # Forces on nodes, and those of a traction.
-        settings.damping, settings.forces, settings.motions = damping, 2 * nodes, nodes
-        settings.fallback, settings.cells = int(fallback), cells or (0, 0, 0)
+        settings.damping, settings.forces, settings.motions = library.not_negative(damping, "damping", "1/s"), 2 * nodes, nodes
+        settings.fallback = int(fallback)
+        # What words of the kernel are about.
+        self._what = method if weights is None else f"{method}: {weights}"
+        if cells is not None:
+            settings.cells = library.cells_of(cells)
+            self._what += f", cells {tuple(settings.cells)}"
         if most_steps is not None:
-            if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
-                raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
-            settings.most_steps = int(most_steps)
+            settings.most_steps = library.whole(most_steps, "most_steps", (1 << 32) - 1)
         self._threads = _threads(threads)
         for name, value in (("seconds", step), ("tolerance", tolerance)):
             if value is not None:
-                if not (np.isfinite(value) and value > 0.0):
-                    raise InputError(f"{'step' if name == 'seconds' else name} {value}: it must be a positive number")
+                what = "step" if name == "seconds" else name
+                if not 0.0 < library.number(value, what) < np.inf:
+                    raise InputError(f"{what} {value}: it must be a positive number")
                 setattr(settings, name, value)
         if weights is not None:
             if method != "learned":
                 raise InputError(f"weights are those of learned steps; {method} steps have none")
             self._weights = _weights(weights)
             settings.weights, settings.weights_bytes = self._weights.pointer, self._weights.size
-        self._adopt(*made_of(scene, settings, method if weights is None else f"{method}: {weights}"))
+        self._adopt(*made_of(scene, settings, self._what))
         self._ablations = list[Ablation]()
         self._contact: Contact | None = None
         self._pull_memory: PullMemory | None = None
         self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
+        self._traction: tuple[NDArray[np.uint32], NDArray[np.float32], float] | None = None
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self.gravity = gravity
@@ -243,20 +250,19 @@ class Simulation:
     @_one_at_a_time
     def set_forces(self, nodes: ArrayLike, newton: ArrayLike, ramp: float = 0.0) -> None:
         """Replaces all forces: on each of these nodes a force (N), one for all or a row for each, which rises evenly over the first `ramp` s
-        of the simulation: set later, it acts in full."""
+        of the simulation: set later, it acts in full. The forces on a node that is named twice add up."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "forces")
         rows = np.zeros(len(numbers), _FORCE)
-        rows["node"], rows["newton"], rows["ramp"] = numbers, library.vectors(newton, "newton", len(numbers)), ramp
+        rows["node"], rows["newton"], rows["ramp"] = numbers, library.vectors(newton, "newton", len(numbers)), library.not_negative(ramp, "ramp", "s")
         self._set_forces(rows, self._tractions)
 
     @_one_at_a_time
     def set_tractions(self, triangles: ArrayLike, pascal: ArrayLike, ramp: float = 0.0) -> None:
-        """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, a force per area at rest
-        (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves."""
-        corners, points = np.asarray(triangles), self.scene.mesh.points
-        if corners.size and (corners.ndim != 2 or corners.shape[1] != 3):
-            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
-        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, each once, a force per area at rest
+        (Pa, one vector), which rises evenly over the first `ramp` s of the simulation. Its direction stays while the body moves; what is
+        removed it lets go of."""
+        points, corners = self.scene.mesh.points, self.scene._triangles_of(triangles, outward=False)
+        numbers, ramp = corners.ravel(), library.not_negative(ramp, "ramp", "s")
         if np.shape(pascal) != (3,):
             raise InputError(f"pascal: {pascal!r}, it must be three numbers, Pa")
         found, error = np.zeros(len(numbers), _FORCE), library.new_error()
@@ -271,6 +277,7 @@ class Simulation:
         np.add.at(newton, place, found["newton"])
         rows["node"], rows["newton"], rows["ramp"] = nodes, newton, ramp
         self._set_forces(self._forces, rows)
+        self._traction = corners, np.array(pascal, np.float32), ramp
 
     def _set_forces(self, forces: NDArray[np.void], tractions: NDArray[np.void]) -> None:
         error, rows = library.new_error(), np.concatenate([forces, tractions])
@@ -279,15 +286,14 @@ class Simulation:
 
     @_one_at_a_time
     def add_pressure(self, triangles: ArrayLike, pascal: float, ramp: float = 0.0) -> Pressure:
-        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as of
-        `Mesh.boundary`. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
+        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as
+        `Mesh.boundary` tells them, seen from outside, each once. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
         the first `ramp` s of the simulation. It is changed through what this gives."""
-        corners, points = np.asarray(triangles), self.scene.mesh.points
-        if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
-            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
-        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        numbers = self.scene._triangles_of(triangles, outward=True).ravel()
+        if not len(numbers):
+            raise InputError("triangles: there are none")
         added = Pressure(self, len(self._pressures), numbers)
-        added._pascal, added._ramp = pascal, ramp
+        added._pascal, added._ramp = library.number(pascal, "pascal"), library.not_negative(ramp, "ramp", "s")
         self._set_pressures([*self._pressures, added])
         return added
 
@@ -317,11 +323,19 @@ class Simulation:
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
         """Replaces all motions: moved nodes of the scene go to these displacements (m) along `axes`, evenly over the first `ramp` s of the
-        simulation, or over the next call of `advance` without one."""
+        simulation, or over the next call of `advance` without one. A node that is named twice must go to one place."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "motions")
         rows = np.zeros(len(numbers), _MOTION)
-        rows["node"], rows["metre"], rows["ramp"] = numbers, library.vectors(metre, "metre", len(numbers)), ramp
+        rows["node"], rows["metre"], rows["ramp"] = numbers, library.vectors(metre, "metre", len(numbers)), library.not_negative(ramp, "ramp", "s")
         rows["axes"] = axes_of(axes, "motions")
+        _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+        bad = np.flatnonzero((rows["metre"] != rows["metre"][first[place]]).any(axis=1))
+        if len(bad):
+            one, other = first[place[bad[0]]], bad[0]
+            raise InputError(
+                f"motions: entries {one} and {other} are both node {numbers[other]}, "
+                f"with {rows['metre'][one].tolist()} and {rows['metre'][other].tolist()} m: only one of them can hold"
+            )
         error, motions = library.new_error(), library.pointer("supple_motion", rows)
         library.checked(lib.supple_set_motions(self._loads, self._raw_scene, motions, len(rows), error), error, "motions")
 
@@ -344,7 +358,7 @@ class Simulation:
     @_one_at_a_time
     def move(self, instrument: int, position: ArrayLike, rotation: ArrayLike | None = None, *, within: float) -> None:
         """Lets an instrument go on a line, and turn evenly, to a pose in the next `within` seconds."""
-        self._touching(instrument).move(instrument, position, rotation, self.time, self.time + within)
+        self._touching(instrument).move(instrument, position, rotation, self.time, self.time + library.number(within, "within"))
 
     @_one_at_a_time
     def touch(self, instrument: int) -> Touch:
@@ -355,7 +369,7 @@ class Simulation:
     def grasp(self, instrument: int, within: float) -> int:
         """Lets an instrument hold the nodes of the surface that are nearer than `within` (m), until `let_go`. Gives how many it holds."""
         held = ffi.new("uint32_t *")
-        status = lib.supple_grasp(self._touching(instrument).raw, self._state, instrument, within, held)
+        status = lib.supple_grasp(self._touching(instrument).raw, self._state, instrument, library.number(within, "within"), held)
         library.checked(status, what=f"instrument {instrument}")
         return int(held[0])
 
@@ -420,7 +434,7 @@ class Simulation:
     @_one_at_a_time
     def _aim(self, wanted: Wanted, targets: NDArray[np.float32], within: float) -> None:
         place = self._place_of(wanted)
-        if not (np.isfinite(within) and within >= 0.0):
+        if not 0.0 <= library.number(within, "within") < np.inf:
             raise InputError(f"within {within} s: it must be zero or more")
         assert self._pull_memory is not None
         self._pull_memory.aim(place.start, targets, (self.time, self.time + within))
@@ -453,8 +467,9 @@ class Simulation:
     @_one_at_a_time
     def remove(self, elements: ArrayLike) -> None:
         """Removes elements, as numbers or as a mask over all, as a resection does: see `exchange`. Nodes without an element stay in all
-        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed, and pressures act on
-        what is left of their surfaces, not on the cut; an open one fills no more."""
+        arrays, held where they are; instruments touch the new surface, pulls and instruments let go of what is removed, and pressures and
+        tractions act on what is left of their surfaces, not on the cut; an open one fills no more. Forces stay on
+        their nodes."""
         scene = self.scene
         removed = scene._removed.copy()
         removed[library.node_numbers(elements, len(removed), "remove", "element")] = 1
@@ -463,7 +478,8 @@ class Simulation:
     @_one_at_a_time
     def ablate(self, elements: ArrayLike, material: Material, seconds: float) -> None:
         """Lets the constants of some elements, as numbers or as a mask, change evenly to those of a material of the same law over so many
-        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities, relaxation and fibres stay. See `exchange`."""
+        seconds from now on, in 20 stages, each at the begin of a call of `advance`. Densities, relaxation and fibres stay. A `reset` or an
+        `exchange` ends it where it is. See `exchange`."""
         ablated(self, elements, material, seconds)
 
     # Supports.
@@ -472,13 +488,18 @@ class Simulation:
     def reaction(self, nodes: ArrayLike) -> Reaction:
         """What tells the force by which some of the fixed or moved nodes act on the tissue. It takes as long as some hundred steps."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "reaction")
+        bad = np.flatnonzero(~np.isin(numbers, self.scene._supports[:, 0]))
+        if len(bad):
+            raise InputError(
+                f"reaction: entry {bad[0]} is node {numbers[bad[0]]}, which the scene neither fixes nor moves", index=int(bad[0]), node=int(numbers[bad[0]])
+            )
         damping = self._settings.damping if self.network is None else self.network["damping"]
         return Reaction(self, numbers, damping)
 
     def _touching(self, instrument: int) -> Contact:
         if self._contact is None:
             raise InputError("there are no instruments: set_instruments comes first")
-        if not 0 <= instrument < len(self._contact.list):
+        if not isinstance(instrument, (int, np.integer)) or not 0 <= instrument < len(self._contact.list):
             raise InputError(f"instrument {instrument}: there are {len(self._contact.list)}, counted from 0")
         return self._contact
 
@@ -538,7 +559,7 @@ class Simulation:
     def advance(self, seconds: float) -> Report:
         """Moves on by so many seconds; learned steps end at the nearest of the network's, and a span shorter than a sixteenth
         of the last step is left to the next call. Raises `Diverged` where a step is refused: the state is then the last good one."""
-        if not (np.isfinite(seconds) and seconds > 0.0):
+        if not 0.0 < library.number(seconds, "seconds") < np.inf:
             raise InputError(f"advance by {seconds} s: it must be a positive number")
         self._warn_once()
         next_stage(self)
@@ -577,7 +598,7 @@ class Simulation:
         """Takes so many exact or long steps of the length that was given."""
         if self._step is None or self.method not in ("exact", "long"):
             raise InputError(f"take: {self.method} steps without a length that is given; call advance")
-        if int(count) != count or count < 1:
+        if not 1.0 <= library.number(count, "count") < np.inf or int(count) != count:
             raise InputError(f"take {count} steps: it must be a whole number, at least 1")
         return self.advance(count * float(self._step))
 
@@ -586,9 +607,8 @@ class Simulation:
         """Brings the body to rest under its loads and instruments, as they act at the present time, which stands still: every node to within
         about `metre` of where it rests, ablations as far as they are due. Velocities are zero afterwards. Each of the steps takes about as
         long as an exact one. Raises `Diverged` where a step is refused."""
-        if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
-            raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
-        if not (np.isfinite(metre) and metre > 0.0):
+        most_steps = library.whole(most_steps, "most_steps", (1 << 32) - 1)
+        if not 0.0 < library.number(metre, "metre") < np.inf:
             raise InputError(f"settle to within {metre} m: it must be a positive number")
         self._warn_once()
         next_stage(self)
@@ -596,7 +616,7 @@ class Simulation:
         if self._pull_memory:
             self._pull_memory.turn(self)
         told = ffi.new("supple_settled *")
-        status = lib.supple_sim_settle(self._sim, metre, int(most_steps), self._threads, room.pointer, room.size, told)
+        status = lib.supple_sim_settle(self._sim, metre, most_steps, self._threads, room.pointer, room.size, told)
         library.checked(status, told.error, "settle")
         word = _WORDS.get(status, str(status))
         return Settled(word != "behind", float(told.remaining), int(told.steps), word)
@@ -685,15 +705,21 @@ class Simulation:
     @_one_at_a_time
     def restore(self, saved: bytes) -> None:
         """Puts the state back; steps go on from there, a network's after a lead-in. Exact steps of a given length without pulls go on to the
-        bit; pulls are turned as the tissue is now."""
+        bit; pulls are turned as the tissue is now. The motion alone goes back: loads and tissue stay as they are now, without what was
+        removed and with what was ablated. An ablation that began later than the state's time ends where it is; another goes on from there
+        when its next stage is due. To have the tissue of that time as well, keep its `scene` and `exchange` it before."""
         data = np.frombuffer(saved, np.uint8)
         library.checked(lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data)), what="restore")
+        self._ablations = [ablation for ablation in self._ablations if ablation.start <= self.time]
         self._prepare_again()
 
     @_one_at_a_time
     def reset(self) -> None:
-        """Back to rest, at time zero; targets of pulls are where they were to go."""
+        """Back to rest, at time zero; targets of pulls are where they were to go. The motion alone goes back: loads and tissue stay as they
+        are now, without what was removed and with what was ablated, and an ablation under way ends where it is. To have the tissue of the
+        start as well, keep its `scene` and `exchange` it before."""
         library.checked(lib.supple_state_reset(self._state))
+        self._ablations = []
         for group in self._pull_groups:
             group.times = (0.0, 0.0)
         self._set_pulls(self._pull_groups)
@@ -712,7 +738,7 @@ class Simulation:
             self._pull_memory.turn(self)
         if self.method != "exact":
             error = library.new_error()
-            library.checked(lib.supple_sim_set(self._sim, self._settings, error), error, self.method)
+            library.checked(lib.supple_sim_set(self._sim, self._settings, error), error, self._what)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...)."""
@@ -740,6 +766,7 @@ class Pressure:
         """Sets it, Pa; it rises evenly over `ramp` s from the start of the simulation."""
         with self._simulation._lock:
             self._check()
+            pascal, ramp = library.number(pascal, "pascal"), library.not_negative(ramp, "ramp", "s")
             status = lib.supple_pressure_set(self._simulation._pressure, self._surface, pascal, ramp)
             library.checked(status, what=f"pressure {pascal} Pa, ramp {ramp} s")
             self._pascal, self._ramp = pascal, ramp
@@ -749,6 +776,7 @@ class Pressure:
         within, `bulk` (Pa) times the share of the volume that is missing. With a bulk of 0 the volume is not asked for."""
         with self._simulation._lock:
             self._check()
+            volume, bulk = library.number(volume, "volume"), library.number(bulk, "bulk")
             status = lib.supple_pressure_fill(self._simulation._pressure, self._surface, volume, bulk)
             library.checked(status, what=f"fill to {volume} m^3 with {bulk} Pa")
             self._filling = (volume, bulk)
@@ -778,7 +806,7 @@ class Pressure:
 
 def _threads(count: int) -> Any:
     """Threads of the kernel's own; the calling one alone is NULL."""
-    if int(count) != count or not 1 <= count <= lib.SUPPLE_MOST_PARTS:
+    if not 1 <= library.number(count, "threads") <= lib.SUPPLE_MOST_PARTS or int(count) != count:
         raise InputError(f"threads {count}: there are 1 to {lib.SUPPLE_MOST_PARTS}")
     if count == 1:
         return ffi.NULL
