@@ -76,6 +76,7 @@ impl Setup {
         let points = ScenePoints::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
+        warnings.extend(body.unused_remark());
         let held = supports.iter().map(|support| support.node).chain(pulls.pulled_nodes());
         warnings.extend(plausible::loose_part(file, &body, held));
         let element = read_element(file, learned.as_ref())?;
