@@ -83,6 +83,7 @@ impl Setup {
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
         warnings.extend(time.old_name.clone());
+        warnings.extend(instruments.warnings(file, &body, &supports)?);
         warnings.extend(points.warnings(file));
         warnings.extend(pulls.warnings(file, &supports));
         if let Some(learned) = &learned {
