@@ -146,6 +146,23 @@ fn damping_comes_back_from_displacements_over_time() {
     assert!(without > known && without < 1.3 * known, "{without}, with them {known}");
 }
 
+#[test]
+fn a_fit_of_runs_that_are_not_ok_says_so() {
+    let desk = Desk::new();
+    let model =
+        scene([2, 2, 5], "").replace("end = 1.0", "end = 0.1\nmethod = \"long\"\nlattice = [1, 1, 2]\nstep = \"40x\"");
+    desk.write("points.csv", &measured(&desk, &model, 0.0, "0.1"));
+    assert_eq!(desk.summary()["status"], "inexact");
+    desk.write("model.toml", &model);
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let words = "model.toml with the values found (inexact): in ";
+    let remedy = "; write method = \"exact\" under [time], or \"auto\" with a tolerance well below the residuals";
+    assert!(said.err.contains(words) && said.err.contains(remedy), "{}", said.err);
+    let warnings = result(&desk)["warnings"].as_array().unwrap().clone();
+    assert!(warnings.iter().any(|warning| warning.as_str().unwrap().starts_with(words)), "{warnings:?}");
+}
+
 /// Springs in place of supports, a pull and an instrument that move, a start at rest: with each, what the scene has.
 #[test]
 fn whatever_acts_in_a_scene_acts_in_its_fit_over_time() {

@@ -49,7 +49,7 @@ impl Distances {
 /// A result that can be told.
 pub(crate) struct Told {
     rows: Vec<(String, String)>,
-    untold: Vec<String>,
+    warnings: Vec<String>,
     json: Value,
 }
 
@@ -94,6 +94,10 @@ impl Told {
             rows.push(("left out".into(), left_out.words()));
         }
         rows.push(("simulations".into(), cases.simulations.to_string()));
+        let mut doubts = vec![];
+        for index in 0..cases.all.len() {
+            doubts.extend(cases.doubts(index, &solution.values)?);
+        }
         let mut untold = statistics.untold.clone();
         if !solution.converged {
             untold.push("the search ended before the best values; start it from these".into());
@@ -104,6 +108,7 @@ impl Told {
             "parameters": parameters,
             "correlations": correlations,
             "cannot_tell": untold,
+            "warnings": cases.warnings.iter().chain(&doubts).collect::<Vec<_>>(),
             "converged": solution.converged,
             "residuals": fitted.json(),
             "left_out": left_out.json(),
@@ -111,7 +116,7 @@ impl Told {
             "simulations": cases.simulations,
             "cases": of_cases.into_iter().map(|(_, _, json)| json).collect::<Vec<_>>(),
         });
-        Ok(Self { rows, untold, json })
+        Ok(Self { rows, warnings: doubts.into_iter().chain(untold).collect(), json })
     }
 
     pub(crate) fn print(&self) {
@@ -123,7 +128,7 @@ impl Told {
                 row(name, words);
             }
         }
-        for sentence in &self.untold {
+        for sentence in &self.warnings {
             message!("warning: {sentence}");
         }
     }

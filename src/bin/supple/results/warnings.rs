@@ -14,6 +14,13 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     if setup.tissues.relax() {
         warnings.push("the frames have no von Mises stress: it is not known of tissue that relaxes".into());
     }
+    warnings.extend(of_run(setup, outcome));
+    warnings
+}
+
+/// Of what became of the scene alone.
+pub(crate) fn of_run(setup: &Setup, outcome: &Outcome) -> Vec<String> {
+    let mut warnings = vec![];
     if let Some(settled) = outcome.settled.filter(|settled| !settled.at_rest) {
         let remedy = if setup.is_free() {
             "nothing holds it"
