@@ -146,6 +146,24 @@ fn damping_comes_back_from_displacements_over_time() {
     assert!(without > known && without < 1.3 * known, "{without}, with them {known}");
 }
 
+/// At the start a body hangs where `settle` has brought it, and is undeformed without.
+#[test]
+fn a_recording_may_begin_with_the_start_of_the_scene() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "") + "settle = 1e-6\n";
+    let points = measured(&desk, &model.replace("end = 1.0", "end = 0.001"), 0.0, "0.0");
+    desk.write("points.csv", &points);
+    desk.write("model.toml", &model);
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (young, rms) = (&result(&desk)["parameters"][0]["value"], &result(&desk)["residuals"]["rms_m"]);
+    println!("{young} of {YOUNG} Pa, residuals {rms} m");
+    assert!((young.as_f64().unwrap() / YOUNG - 1.0).abs() < 0.01 && rms.as_f64().unwrap() < 2e-5);
+    desk.write("points.csv", &points.replace("0.0,n", "-0.001,n"));
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert!(said.code == 2 && said.err.contains("time_s is -0.001, it must be zero or more"), "{}", said.err);
+}
+
 #[test]
 fn a_fit_of_runs_that_are_not_ok_says_so() {
     let desk = Desk::new();
