@@ -271,6 +271,8 @@ fn what_the_data_cannot_tell_is_told() {
     assert!(said.err.contains("material.density moves no measured point"), "{}{}", said.out, said.err);
     let result = result(&desk);
     assert_eq!([&result["parameters"][0]["told"], &result["parameters"][1]["told"]], [true, false], "{}", said.out);
+    let said = fit(&desk, &format!("{density}{}", case("")));
+    assert!(said.code == 0 && said.out.contains("each point left out") && !said.out.contains("NaN"), "{}", said.out);
     // Poisson's ratio of a bending bar, with the noise of a tracker.
     let points = measured(&desk, &model, 0.5e-3, "");
     desk.write("points.csv", &points);
@@ -279,6 +281,23 @@ fn what_the_data_cannot_tell_is_told() {
     assert_eq!(said.code, 0, "{}", said.err);
     println!("{}{}", said.out, said.err);
     assert!(said.err.contains("cannot tell material.poisson"), "{}{}", said.out, said.err);
+}
+
+/// A share of what is truly zero says nothing; of the range it does.
+#[test]
+fn a_value_that_is_zero_can_be_told() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "");
+    desk.write("points.csv", &measured(&desk, &model, 0.1e-3, ""));
+    desk.write("model.toml", &model);
+    let gravity = "[[parameter]]\nname = \"gravity[1]\"\nstart = 0.5\nmin = -8.0\nmax = 8.0\n";
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{gravity}{}", case("")));
+    println!("{}{}", said.out, said.err);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    let across = result(&desk)["parameters"][1].clone();
+    let (value, error) = (across["value"].as_f64().unwrap(), across["standard_error"].as_f64().unwrap());
+    assert!(value.abs() < 4.0 * error && error > 0.5 * value.abs() && error < 0.08, "{value} +- {error}");
+    assert_eq!(across["told"], true);
 }
 
 #[test]
