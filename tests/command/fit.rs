@@ -283,6 +283,38 @@ fn what_the_data_cannot_tell_is_told() {
     assert!(said.err.contains("cannot tell material.poisson"), "{}{}", said.out, said.err);
 }
 
+/// From this start the first steps take `d` to its maximum, where a small change of it moves nothing.
+#[test]
+fn a_value_that_has_gone_to_its_limit_comes_back() {
+    let desk = Desk::new();
+    let model = scene([3, 3, 9], "")
+        .replace("[9.81, 0.0, 0.0]", "[0.0, 2.0, 9.81]")
+        .replace("[0.02, 0.02, 0.05]", "[0.03, 0.03, 0.09]")
+        .replace("c = 5000.0", "c = 1584.5")
+        .replace("d = 75000.0", "d = 9375.0")
+        .replace("end = 1.0", "end = 0.01\nsettle = 1e-7");
+    desk.write("points.csv", &measured(&desk, &model, 0.0, ""));
+    desk.write("model.toml", &model);
+    let c = "[[parameter]]\nname = \"material.c\"\nstart = 600.0\nmin = 100.0\nmax = 1e6\n";
+    let d = "[[parameter]]\nname = \"material.d\"\nstart = 6e4\nmin = 1e3\nmax = 1e6\n";
+    let said = fit(&desk, &format!("{c}{d}{}", case("")));
+    println!("{}{}", said.out, said.err);
+    // They are known to 1e-4, so that a correlation of -0.98 does not matter.
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    for (index, truth) in [1584.5, 9375.0].into_iter().enumerate() {
+        let value = result(&desk)["parameters"][index]["value"].as_f64().unwrap();
+        assert!((value / truth - 1.0).abs() < 1e-3, "{value} of {truth}");
+    }
+    // One that must stay there has the others' errors with it.
+    let said = fit(
+        &desk,
+        &format!("{c}{}{}", d.replace("max = 1e6", "max = 8e4").replace("min = 1e3", "min = 2e4"), case("")),
+    );
+    assert_eq!(said.code, 0, "{}", said.err);
+    let words = "material.d stays at its limit, 20000: the data want it further, and the other values and their errors hold only if it is the truth";
+    assert!(said.err.contains(words), "{}{}", said.out, said.err);
+}
+
 /// A share of what is truly zero says nothing; of the range it does.
 #[test]
 fn a_value_that_is_zero_can_be_told() {
