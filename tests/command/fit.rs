@@ -332,6 +332,41 @@ fn a_value_that_is_zero_can_be_told() {
     assert_eq!(across["told"], true);
 }
 
+/// Places for displacements, and millimetres for metres.
+#[test]
+fn what_was_measured_otherwise_is_remarked_upon() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "");
+    let points = measured(&desk, &model, 0.0, "");
+    desk.write("model.toml", &model);
+    let changed = |change: &dyn Fn(f64, f64) -> f64| {
+        let mut lines: Vec<String> = points.lines().map(String::from).collect();
+        for line in &mut lines[1..] {
+            let cells: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
+            let moved: Vec<_> = (0..3).map(|axis| change(cells[axis], cells[3 + axis]).to_string()).collect();
+            let places: Vec<_> = line.split(',').take(4).collect();
+            *line = format!("{},{}", places.join(","), moved.join(","));
+        }
+        desk.write("points.csv", &(lines.join("\n") + "\n"));
+        let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+        println!("{}{}", said.out, said.err);
+        said
+    };
+    let said = changed(&|place, metre| place + metre);
+    assert!(
+        said.err.contains("model.toml: the points are ") && said.err.contains("displacements and not places"),
+        "{}",
+        said.err
+    );
+    let said = changed(&|_, metre| 1e3 * metre);
+    assert!(
+        said.err.contains("mm, the body is 57 mm across; displacements are in metres (1 mm is 0.001)"),
+        "{}",
+        said.err
+    );
+    assert!(!said.err.contains("moves no measured point"), "{}", said.err);
+}
+
 #[test]
 fn a_value_stays_at_its_limit_and_says_so() {
     let desk = Desk::new();

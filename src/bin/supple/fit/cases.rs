@@ -171,20 +171,23 @@ impl Case {
             );
             return Err(fit.problem(&table.measured, message));
         }
+        let mut warnings = setup.warnings;
+        let length =
+            |sample: &Sample| sample.displacement.iter().flatten().map(|metre| metre * metre).sum::<f64>().sqrt();
+        let farthest = samples.iter().map(|sample| (length(sample), &sample.name)).max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((metre, name)) = farthest.filter(|(metre, _)| *metre > setup.body.diagonal()) {
+            let message = format!(
+                "the displacement of {name} is {:.0} mm, the body is {:.0} mm across; displacements are in metres (1 mm is 0.001)",
+                1e3 * metre,
+                1e3 * setup.body.diagonal()
+            );
+            warnings.push(fit.problem(&table.measured, message).0);
+        }
         let measured = samples.iter().flat_map(|sample| sample.displacement).flatten();
         let squares: Vec<f64> = measured.map(|metre| metre * metre).collect();
         let rest = (REST * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()).max(LEAST_REST);
         let name = table.scene.get_ref().display().to_string();
-        Ok(Self {
-            name,
-            file,
-            scene: table.scene.get_ref().clone(),
-            samples,
-            left_out,
-            points,
-            warnings: setup.warnings,
-            rest,
-        })
+        Ok(Self { name, file, scene: table.scene.get_ref().clone(), samples, left_out, points, warnings, rest })
     }
 
     /// Whether a value is one of this case.
