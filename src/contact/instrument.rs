@@ -60,6 +60,12 @@ impl<'a> Instrument<'a> {
         from.distance(to)
     }
 
+    /// Distance of a point (m) to its surface at `time` (s), m; negative inside.
+    #[must_use]
+    pub fn distance(&self, point: [f32; 3], time: f64) -> f32 {
+        self.shape.nearest(self.placement(time).in_shape(point.into())).0
+    }
+
     /// Where it is at `time`, s.
     pub(super) fn placement(&self, time: f64) -> Placement {
         let [start, end] = self.times;

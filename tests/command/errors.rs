@@ -139,7 +139,6 @@ fn bad_meshes_are_refused_in_words() {
         (gmsh(corners, "1 4 1 1 4 1 2 3 9\n"), "9"),
         (gmsh(&corners.replace("4 0 0 0.01", "4 0.01 0.01 0"), "1 4 1 1 4 1 2 3 4\n"), "element 0: degenerate"),
         (gmsh(&corners.replace("4 0 0 0.01", "4 nan 0 0.01"), "1 4 1 1 4 1 2 3 4\n"), "node 3: coordinate x is NaN"),
-        (gmsh(&format!("{corners}5 1 1 1\n"), "1 4 1 1 4 1 2 3 4\n"), "node 4 belongs to no element; remove it"),
         (gmsh(corners, ""), "no tetrahedra"),
         ("nonsense\n".into(), "mesh.msh"),
     ];
@@ -159,6 +158,36 @@ fn bad_meshes_are_refused_in_words() {
     let said = desk.simulate(&scene.replace("[material]", "winding = \"normalise\"\n[material]"), &[]);
     assert_eq!(said.code, 0, "{}", said.err);
     assert_eq!(desk.summary()["volume_change_percent"].as_f64().map(f64::abs), Some(0.0));
+}
+
+/// The second node belongs to no element: the third is the second then.
+#[test]
+fn a_node_without_an_element_is_left_out_unless_nodes_are_named_by_number() {
+    let desk = Desk::new();
+    desk.write(
+        "mesh.msh",
+        "$NOD\n5\n1 0 0 0\n2 1 1 1\n3 0.01 0 0\n4 0 0.01 0\n5 0 0 0.01\n$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 3 4 5\n$ENDELM\n",
+    );
+    let scene = |entry: &str| {
+        format!(
+            "[mesh]\nfile = \"mesh.msh\"\n[material]\nlaw = \"neo-hookean\"\nc = 500.0\nd = 15000.0\ndensity = 1000.0\n{entry}\n\
+             [time]\nend = 0.001\n"
+        )
+    };
+    for entry in ["[[fix]]\nplane = { axis = \"z\", at = 0.0 }", "[[fix]]\nnodes = [0]"] {
+        let said = desk.simulate(&scene(entry), &["--force"]);
+        assert_eq!(said.code, 0, "{}", said.err);
+        assert!(
+            said.err.contains("mesh.msh: nodes that belong to no element are left out: 1, the first is 1"),
+            "{}",
+            said.err
+        );
+        assert_eq!(desk.summary()["nodes"], 4);
+        assert_eq!(desk.last()[1][1..4], [0.01, 0.0, 0.0]);
+    }
+    let said = desk.simulate(&scene("[[fix]]\nnodes = [0, 2, 3]"), &["--force"]);
+    assert_eq!(said.code, 2);
+    assert!(said.err.contains("node 1 belongs to no element; remove it from the mesh"), "{}", said.err);
 }
 
 #[test]

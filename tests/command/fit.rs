@@ -146,6 +146,41 @@ fn damping_comes_back_from_displacements_over_time() {
     assert!(without > known && without < 1.3 * known, "{without}, with them {known}");
 }
 
+/// At the start a body hangs where `settle` has brought it, and is undeformed without.
+#[test]
+fn a_recording_may_begin_with_the_start_of_the_scene() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "") + "settle = 1e-6\n";
+    let points = measured(&desk, &model.replace("end = 1.0", "end = 0.001"), 0.0, "0.0");
+    desk.write("points.csv", &points);
+    desk.write("model.toml", &model);
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (young, rms) = (&result(&desk)["parameters"][0]["value"], &result(&desk)["residuals"]["rms_m"]);
+    println!("{young} of {YOUNG} Pa, residuals {rms} m");
+    assert!((young.as_f64().unwrap() / YOUNG - 1.0).abs() < 0.01 && rms.as_f64().unwrap() < 2e-5);
+    desk.write("points.csv", &points.replace("0.0,n", "-0.001,n"));
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert!(said.code == 2 && said.err.contains("time_s is -0.001, it must be zero or more"), "{}", said.err);
+}
+
+#[test]
+fn a_fit_of_runs_that_are_not_ok_says_so() {
+    let desk = Desk::new();
+    let model =
+        scene([2, 2, 5], "").replace("end = 1.0", "end = 0.1\nmethod = \"long\"\nlattice = [1, 1, 2]\nstep = \"40x\"");
+    desk.write("points.csv", &measured(&desk, &model, 0.0, "0.1"));
+    assert_eq!(desk.summary()["status"], "inexact");
+    desk.write("model.toml", &model);
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+    assert_eq!(said.code, 0, "{}", said.err);
+    let words = "model.toml with the values found (inexact): in ";
+    let remedy = "; write method = \"exact\" under [time], or \"auto\" with a tolerance well below the residuals";
+    assert!(said.err.contains(words) && said.err.contains(remedy), "{}", said.err);
+    let warnings = result(&desk)["warnings"].as_array().unwrap().clone();
+    assert!(warnings.iter().any(|warning| warning.as_str().unwrap().starts_with(words)), "{warnings:?}");
+}
+
 /// Springs in place of supports, a pull and an instrument that move, a start at rest: with each, what the scene has.
 #[test]
 fn whatever_acts_in_a_scene_acts_in_its_fit_over_time() {
@@ -236,6 +271,8 @@ fn what_the_data_cannot_tell_is_told() {
     assert!(said.err.contains("material.density moves no measured point"), "{}{}", said.out, said.err);
     let result = result(&desk);
     assert_eq!([&result["parameters"][0]["told"], &result["parameters"][1]["told"]], [true, false], "{}", said.out);
+    let said = fit(&desk, &format!("{density}{}", case("")));
+    assert!(said.code == 0 && said.out.contains("each point left out") && !said.out.contains("NaN"), "{}", said.out);
     // Poisson's ratio of a bending bar, with the noise of a tracker.
     let points = measured(&desk, &model, 0.5e-3, "");
     desk.write("points.csv", &points);
@@ -244,6 +281,90 @@ fn what_the_data_cannot_tell_is_told() {
     assert_eq!(said.code, 0, "{}", said.err);
     println!("{}{}", said.out, said.err);
     assert!(said.err.contains("cannot tell material.poisson"), "{}{}", said.out, said.err);
+}
+
+/// From this start the first steps take `d` to its maximum, where a small change of it moves nothing.
+#[test]
+fn a_value_that_has_gone_to_its_limit_comes_back() {
+    let desk = Desk::new();
+    let model = scene([3, 3, 9], "")
+        .replace("[9.81, 0.0, 0.0]", "[0.0, 2.0, 9.81]")
+        .replace("[0.02, 0.02, 0.05]", "[0.03, 0.03, 0.09]")
+        .replace("c = 5000.0", "c = 1584.5")
+        .replace("d = 75000.0", "d = 9375.0")
+        .replace("end = 1.0", "end = 0.01\nsettle = 1e-7");
+    desk.write("points.csv", &measured(&desk, &model, 0.0, ""));
+    desk.write("model.toml", &model);
+    let c = "[[parameter]]\nname = \"material.c\"\nstart = 600.0\nmin = 100.0\nmax = 1e6\n";
+    let d = "[[parameter]]\nname = \"material.d\"\nstart = 6e4\nmin = 1e3\nmax = 1e6\n";
+    let said = fit(&desk, &format!("{c}{d}{}", case("")));
+    println!("{}{}", said.out, said.err);
+    // They are known to 1e-4, so that a correlation of -0.98 does not matter.
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    for (index, truth) in [1584.5, 9375.0].into_iter().enumerate() {
+        let value = result(&desk)["parameters"][index]["value"].as_f64().unwrap();
+        assert!((value / truth - 1.0).abs() < 1e-3, "{value} of {truth}");
+    }
+    // One that must stay there has the others' errors with it.
+    let said = fit(
+        &desk,
+        &format!("{c}{}{}", d.replace("max = 1e6", "max = 8e4").replace("min = 1e3", "min = 2e4"), case("")),
+    );
+    assert_eq!(said.code, 0, "{}", said.err);
+    let words = "material.d stays at its limit, 20000: the data want it further, and the other values and their errors hold only if it is the truth";
+    assert!(said.err.contains(words), "{}{}", said.out, said.err);
+}
+
+/// A share of what is truly zero says nothing; of the range it does.
+#[test]
+fn a_value_that_is_zero_can_be_told() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "");
+    desk.write("points.csv", &measured(&desk, &model, 0.1e-3, ""));
+    desk.write("model.toml", &model);
+    let gravity = "[[parameter]]\nname = \"gravity[1]\"\nstart = 0.5\nmin = -8.0\nmax = 8.0\n";
+    let said = fit(&desk, &format!("{YOUNG_TABLE}{gravity}{}", case("")));
+    println!("{}{}", said.out, said.err);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    let across = result(&desk)["parameters"][1].clone();
+    let (value, error) = (across["value"].as_f64().unwrap(), across["standard_error"].as_f64().unwrap());
+    assert!(value.abs() < 4.0 * error && error > 0.5 * value.abs() && error < 0.08, "{value} +- {error}");
+    assert_eq!(across["told"], true);
+}
+
+/// Places for displacements, and millimetres for metres.
+#[test]
+fn what_was_measured_otherwise_is_remarked_upon() {
+    let desk = Desk::new();
+    let model = scene([2, 2, 5], "");
+    let points = measured(&desk, &model, 0.0, "");
+    desk.write("model.toml", &model);
+    let changed = |change: &dyn Fn(f64, f64) -> f64| {
+        let mut lines: Vec<String> = points.lines().map(String::from).collect();
+        for line in &mut lines[1..] {
+            let cells: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
+            let moved: Vec<_> = (0..3).map(|axis| change(cells[axis], cells[3 + axis]).to_string()).collect();
+            let places: Vec<_> = line.split(',').take(4).collect();
+            *line = format!("{},{}", places.join(","), moved.join(","));
+        }
+        desk.write("points.csv", &(lines.join("\n") + "\n"));
+        let said = fit(&desk, &format!("{YOUNG_TABLE}{}", case("")));
+        println!("{}{}", said.out, said.err);
+        said
+    };
+    let said = changed(&|place, metre| place + metre);
+    assert!(
+        said.err.contains("model.toml: the points are ") && said.err.contains("displacements and not places"),
+        "{}",
+        said.err
+    );
+    let said = changed(&|_, metre| 1e3 * metre);
+    assert!(
+        said.err.contains("mm, the body is 57 mm across; displacements are in metres (1 mm is 0.001)"),
+        "{}",
+        said.err
+    );
+    assert!(!said.err.contains("moves no measured point"), "{}", said.err);
 }
 
 #[test]

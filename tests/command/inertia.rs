@@ -105,6 +105,21 @@ fn a_step_may_be_left_to_the_tolerance() {
     assert!(steps.is_sorted_by(|a, b| a >= b) && steps[3] < exact_steps / 4, "{steps:?}");
 }
 
+/// 0.1 in float32 is above 0.1 in float64.
+#[test]
+fn a_step_may_be_as_long_as_the_whole_time() {
+    let desk = Desk::new();
+    for (end, time) in
+        [("0.05", "method = \"auto\"\n"), ("0.1", "method = \"long\"\ntolerance = 1e-3\n"), ("0.001", "step = 0.001\n")]
+    {
+        let scene = bar(&format!("[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[time]\nend = {end}\n{time}"));
+        let stiff = scene.replace("cells = [2, 2, 5]", "cells = [3, 3, 6]");
+        let said = desk.simulate(if time.contains("method") { &stiff } else { &scene }, &["--force"]);
+        assert_eq!(said.code, 0, "{end} {time}: {}", said.err);
+        assert!((desk.summary()["time_s"].as_f64().unwrap() - end.parse::<f64>().unwrap()).abs() < 1e-8);
+    }
+}
+
 #[test]
 fn a_lattice_and_a_step_may_be_given_by_hand() {
     let desk = Desk::new();

@@ -67,7 +67,7 @@ fn instruments_that_cannot_be_are_refused_with_their_line() {
         (sphere.replace("path = [[0.0, 0.0, 0.0, 0.1]]\n", ""), "line 11: an instrument needs a path"),
         (format!("{sphere}friction = -1.0\n"), "line 15: friction is -1, it must be zero or more"),
         (format!("{sphere}direction = [0.0, 0.0, 0.0]\n"), "line 15: direction is [0.0, 0.0, 0.0]; it needs a length"),
-        (sphere.replace("0.0, 0.0, 0.1]]", "0.01, 0.01, 0.02]]"), "line 11: this instrument starts inside the body"),
+        (sphere.replace("0.0, 0.0, 0.1]]", "0.01, 0.01, 0.02]]"), "line 11: the axis of this instrument starts inside"),
         (format!("{sphere}length = 0.1\n"), "line 15: a sphere has no use for that size"),
         ("shape = \"field\"\n".into(), "line 11: a field needs the file of a mesh"),
         ("shape = \"field\"\nfile = \"none.msh\"\n".into(), "line 13: none.msh"),
@@ -103,5 +103,37 @@ fn steps_that_may_pass_over_a_part_of_a_path_are_warned_of() {
         assert_eq!(said.code, 0, "{}", said.err);
         let words = "are longer than the part of a path from 0.010 s on, and may pass over it";
         assert_eq!(said.err.contains(words), warns, "{}", said.err);
+    }
+}
+
+/// Of a plane and of a ball nodes are inside, of a ball above the middle of a face the face is, and held nodes meet no instrument.
+#[test]
+fn an_instrument_that_starts_inside_is_warned_of_with_its_depth() {
+    let desk = Desk::new();
+    let plane = |z: f64| format!("shape = \"plane\"\ndirection = [0.0, 0.0, -1.0]\npath = [[0.0, 0.0, 0.0, {z}]]\n");
+    let ball = |x: f64, z: f64| format!("shape = \"sphere\"\nradius = 0.008\npath = [[0.0, {x}, {x}, {z}]]\n");
+    let capsule = "shape = \"capsule\"\nradius = 0.004\nlength = 0.04\ndirection = [1.0, 0.0, 0.0]\npath = [[0.0, 0.01, 0.005, 0.053]]\n";
+    let table = "shape = \"plane\"\npath = [[0.0, 0.0, 0.0, 0.003]]\n";
+    for (entry, depth) in [
+        (plane(0.049), "1.000"),
+        (plane(0.05), ""),
+        (ball(0.01, 0.0575), "0.500"),
+        (ball(0.01, 0.058), ""),
+        (ball(0.005, 0.0575), "0.500"),
+        (capsule.into(), "1.000"),
+        (table.into(), ""),
+    ] {
+        for (settle, moves) in
+            [("", "the tissue jumps out of it"), ("settle = 1e-3\n", "settle has to move the tissue out of it")]
+        {
+            let fix = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n";
+            let scene = bar(&format!("{fix}[[instrument]]\n{entry}[time]\nend = 1e-4\n{settle}"));
+            let said = desk.simulate(&scene, &["--force"]);
+            print!("{}", said.err);
+            assert_eq!(said.code, 0, "{}", said.err);
+            let words = format!("line 13: this instrument starts {depth} mm inside the body: {moves}");
+            assert_eq!(said.err.contains("mm inside the body"), !depth.is_empty(), "{entry}{}", said.err);
+            assert!(depth.is_empty() || said.err.contains(&words), "{words}: {}", said.err);
+        }
     }
 }

@@ -139,6 +139,23 @@ fn a_body_settles_under_gravity_and_a_pressure_before_time_begins() {
     let said = desk.simulate(&free, &["--force"]);
     println!("{}{}", said.out, said.err);
     assert_eq!(desk.summary()["settled"]["at_rest"], false);
+    assert!(
+        said.err.contains("scene.toml: nothing holds the body: it goes where gravity and forces take it"),
+        "{}",
+        said.err
+    );
+    assert!(said.err.contains("m to go; nothing holds it"), "{}", said.err);
+}
+
+#[test]
+fn the_mass_is_that_of_the_tissue_and_of_what_hangs_on_it() {
+    let desk = Desk::new();
+    let weight = "[[mass]]\nplane = { axis = \"z\", at = 0.05 }\nkilogram = 0.001\n";
+    let said = desk
+        .simulate(&bar(&format!("{weight}[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[time]\nend = 1e-4\n")), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let mass = desk.summary()["mass_kg"].as_f64().unwrap();
+    assert!((mass - 0.020 - 0.009).abs() < 1e-7 && said.out.contains(" 29.0 g"), "{mass}: {}", said.out);
 }
 
 #[test]

@@ -86,6 +86,10 @@ def test_what_the_data_cannot_tell_is_told():
     noisy = measured + np.random.default_rng(4).normal(0.0, 5e-3, (12, 3))
     loose = supple.fit(model, {"young": 1.0, "bend": 1.0}, noisy, bounds=BOUNDS)
     assert any("the data cannot tell bend: its standard error" in sentence for sentence in loose.cannot_tell), loose.cannot_tell
+    zero = supple.fit(model, {"young": 1.0, "bend": 1.0}, measured, bounds=BOUNDS)
+    assert zero.standard_errors["bend"] > 0.5 * abs(zero.values["bend"]) and zero.cannot_tell == [], zero.cannot_tell
+    places = supple.fit(model, {"young": 1.0}, measured - 0.05, bounds=BOUNDS)
+    assert any("displacements and not places" in sentence for sentence in places.cannot_tell), places.cannot_tell
     limit = supple.fit(model, {"young": 1.0}, measured, bounds={"young": (0.1, 1.5)})
     assert limit.values["young"] == pytest.approx(1.5) and "young stays at its limit, 1.5" in limit.cannot_tell[0]
 

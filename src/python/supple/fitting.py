@@ -15,6 +15,7 @@ Simulate = Callable[[dict[str, float]], ArrayLike]
 
 # As in the command (src/bin/supple/fit): the step of finite differences and what they must exceed, the end of the search, what cannot be told.
 _DIFFERENCE = 0.05
+_LARGE_DIFFERENCE = 0.5
 _NOISE = 2e-4
 _NEAR = 0.2
 _NEAR_SHARE = 1e-3
@@ -23,7 +24,11 @@ _REFUSED = 10.0
 _SINGULAR = 1e-6
 _MOST_OF_VALUE = 0.5
 _MOST_OF_RANGE = 0.1
+_SMALL_OF_RANGE = 0.01
 _MOST_CORRELATION = 0.98
+_LOOSE = 0.1
+_SAME = 0.9999
+_MOST_MISSED = 1.0 / 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,19 +213,36 @@ class _Problem:
         for index, x in enumerate(here.x):
             least, most = self.ends[:, index]
             up = most - x >= x - least
-            step = min(_DIFFERENCE * float(np.clip(abs(x), _DIFFERENCE, 1.0)), most - x if up else x - least) * (1.0 if up else -1.0)
-            there = here.x.copy()
-            there[index] += step
-            difference = self.at(there).residuals - here.residuals
-            is_noise = np.linalg.norm(difference) <= _NOISE * np.linalg.norm(self.numbers)
-            columns.append(0.0 * difference if is_noise else difference / step)
+            room = most - x if up else x - least
+            column = self._difference(here, index, min(_DIFFERENCE * float(np.clip(abs(x), _DIFFERENCE, 1.0)), room), up)
+            if not column.any():
+                # As of a tissue that hardly changes its volume.
+                try:
+                    column = self._difference(here, index, min(_LARGE_DIFFERENCE, room), up)
+                except InputError:
+                    raise
+                except Error:
+                    pass
+            columns.append(column)
         return np.stack(columns, axis=1)
+
+    def _difference(self, here: _Point, index: int, step: float, up: bool) -> Floats:
+        step = step if up else -step
+        there = here.x.copy()
+        there[index] += step
+        difference = self.at(there).residuals - here.residuals
+        is_noise = np.linalg.norm(difference) <= _NOISE * np.linalg.norm(self.numbers)
+        return 0.0 * difference if is_noise else difference / step
 
     def held(self, here: _Point, jacobian: Floats) -> NDArray[np.bool_]:
         """Which coordinates are at a bound towards which the residuals fall."""
-        downhill, near = -jacobian.T @ here.residuals, 1e-6 * np.ptp(self.ends, axis=0)
-        held: NDArray[np.bool_] = ((here.x <= self.ends[0] + near) & (downhill < 0.0)) | ((here.x >= self.ends[1] - near) & (downhill > 0.0))
+        downhill, (low, high) = -jacobian.T @ here.residuals, self.at_ends(here)
+        held: NDArray[np.bool_] = (low & (downhill < 0.0)) | (high & (downhill > 0.0))
         return held
+
+    def at_ends(self, here: _Point) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        near = 1e-6 * np.ptp(self.ends, axis=0)
+        return here.x <= self.ends[0] + near, here.x >= self.ends[1] - near
 
     def is_near(self, here: _Point, jacobian: Floats) -> bool:
         """Whether the best values of the linear model are as near as asked."""
@@ -284,7 +306,8 @@ def _search(problem: _Problem, here: _Point, jacobian: Floats) -> _Point:
 def _inverse_of_normal(columns: Floats) -> Floats:
     """(J'J)^-1, large and finite in directions that the data do not show."""
     lengths = np.linalg.norm(columns, axis=0)
-    lengths = np.maximum(lengths, max(_SINGULAR * lengths.max(initial=0.0), np.finfo(float).tiny))
+    largest = lengths.max(initial=0.0)
+    lengths = np.maximum(lengths, _SINGULAR * largest) if largest > 0.0 else np.ones_like(lengths)
     values, vectors = np.linalg.eigh((columns / lengths).T @ (columns / lengths))
     inverse: Floats = (vectors / np.maximum(values, _SINGULAR**2)) @ vectors.T / np.outer(lengths, lengths)
     return inverse
@@ -292,12 +315,14 @@ def _inverse_of_normal(columns: Floats) -> Floats:
 
 def _told(problem: _Problem, here: _Point, jacobian: Floats, converged: bool) -> Fit:
     values, held = problem.values(here.x), problem.held(here, jacobian)
+    # One that has gone there stays there where nothing tells whether it wants to go further.
+    held |= np.logical_or(*problem.at_ends(here)) & ~jacobian.any(axis=0) & (here.x != 1.0)
     jacobian = jacobian * problem.slopes(values)
     inverse, count = _inverse_of_normal(jacobian), len(values)
     freedom = len(here.residuals) - count
     variance = here.residuals @ here.residuals / freedom if freedom > 0 else np.inf
     with np.errstate(invalid="ignore"):
-        errors = np.sqrt(variance * np.diag(inverse))
+        errors = np.where(jacobian.any(axis=0), np.sqrt(variance * np.diag(inverse)), np.inf)
     correlations = inverse / np.sqrt(np.outer(np.diag(inverse), np.diag(inverse)))
     residuals = problem.displacements(here.x) - problem.measured
     distances = np.sqrt(np.nansum(residuals**2, axis=-1))
@@ -305,6 +330,12 @@ def _told(problem: _Problem, here: _Point, jacobian: Floats, converged: bool) ->
     fitted, out = is_seen & ~problem.is_out, is_seen & problem.is_out
     of_points = np.where(fitted, distances, -1.0).reshape(-1, len(problem.is_out)).max(axis=0)
     untold = _cannot_tell(problem, values, errors, correlations, jacobian, held)
+    missed, moved = _rms(distances[fitted]), _rms(np.sqrt(np.nansum(problem.measured**2, axis=-1))[fitted])
+    if missed > _MOST_MISSED * moved:
+        untold.append(
+            f"the points are {1e3 * missed:.2f} mm rms from where they were measured, and have moved by {1e3 * moved:.2f} mm; is what was measured in "
+            "metres, displacements and not places, and are the loads in the simulation those that acted?"
+        )
     if not converged:
         untold.append("the search ended before the best values; start it from these")
     return Fit(
@@ -313,7 +344,7 @@ def _told(problem: _Problem, here: _Point, jacobian: Floats, converged: bool) ->
         correlations=correlations,
         cannot_tell=untold,
         residuals=residuals,
-        rms=_rms(distances[fitted]),
+        rms=missed,
         worst=float(distances[fitted].max()),
         worst_point=int(of_points.argmax()),
         left_out_rms=_rms(distances[out]) if out.any() else None,
@@ -331,21 +362,30 @@ def _rms(distances: Floats) -> float:
 def _cannot_tell(
     problem: _Problem, values: Floats, errors: Floats, correlations: Floats, jacobian: Floats, held: NDArray[np.bool_]
 ) -> list[str]:
-    said = []
+    said, loose = [], []
     for index, name in enumerate(problem.names):
-        least, most = problem.limits[index]
-        if not jacobian[:, index].any():
+        (least, most), value, error = problem.limits[index], values[index], errors[index]
+        # Of a value near zero there is no share.
+        is_near_zero = least * most < 0.0 or (least * most == 0.0 and error <= _SMALL_OF_RANGE * (most - least))
+        share = 0.0 if is_near_zero else error / (_MOST_OF_VALUE * abs(value)) if value != 0.0 else np.inf
+        loose.append(max(error / (_MOST_OF_RANGE * (most - least)), share))
+        is_told, is_still = loose[-1] <= 1.0, not jacobian[:, index].any()
+        if held[index] and (is_still or is_told):
+            what = "there it moves no measured point" if is_still else "the data want it further"
+            others = ", and the other values and their errors hold only if it is the truth" if len(values) > 1 else ""
+            said.append(f"{name} stays at its limit, {value:g}: {what}{others}; give a wider limit, or look for another cause of what they show")
+        elif is_still:
             said.append(f"{name} moves no measured point; measure elsewhere, or leave it out")
-        elif errors[index] > min(_MOST_OF_VALUE * abs(values[index]), _MOST_OF_RANGE * (most - least)):
+        elif not is_told:
+            limit = ", at its limit," if held[index] else ""
             said.append(
-                f"the data cannot tell {name}: its standard error is {errors[index]:.4g}, its value {values[index]:.4g} of a range from {least:g} to "
+                f"the data cannot tell {name}: its standard error is {error:.4g}, its value {value:.4g}{limit} of a range from {least:g} to "
                 f"{most:g}; give it a fixed value from another source"
             )
-        elif held[index]:
-            said.append(f"{name} stays at its limit, {values[index]:g}: the data want it further; give a wider limit, or look for another cause")
     for a in range(len(values)):
         for b in range(a):
-            if abs(correlations[a, b]) > _MOST_CORRELATION:
+            size = abs(correlations[a, b])
+            if size > _SAME or (size > _MOST_CORRELATION and max(loose[a], loose[b]) > _LOOSE):
                 names = f"{problem.names[b]} from {problem.names[a]}"
                 said.append(f"the data cannot tell {names}: their correlation is {correlations[a, b]:.4f}; fix one of them")
     return said

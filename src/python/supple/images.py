@@ -19,6 +19,7 @@ from . import _library as library
 from ._library import ffi, lib
 from .errors import InputError
 from .mesh import Mesh
+from .points import _located
 
 _KINDS = {"forward": lib.SUPPLE_FORWARD_FIELD, "inverse": lib.SUPPLE_INVERSE_FIELD}
 # From the axes of the mesh to LPS, and back.
@@ -123,6 +124,8 @@ class Field:
         if self.kind != "inverse":
             raise InputError("an image is warped with an inverse field, this is a forward one")
         sitk = _simple_itk()
+        if "complex" in image.GetPixelIDTypeAsString():
+            raise InputError("the image has complex values, which have no order: warp its real and its imaginary part by themselves")
         outside = 0.0 if labels else float(np.fmin.reduce(sitk.GetArrayViewFromImage(image), axis=None))
         return sitk.Resample(image, image, self.transform(), sitk.sitkNearestNeighbor if labels else sitk.sitkLinear, outside)
 
@@ -171,6 +174,23 @@ def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, fl
         )
     values *= (1e3 * signs).astype(np.float32)
     return Field(kind, grid, values, int(covered[0]))
+
+
+def points_from_outside(mesh: Mesh, field: Field, image: Any, axes: str) -> int:
+    """How many points of an inverse field are within the tissue, and their material comes from outside the image: more than half a voxel."""
+    grid, of_image, found = field.grid, Grid.of(image), 0
+    corners = 1e3 * _SIGNS[axes] * np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for layer, values in enumerate(field.values):
+        origin = np.asarray(grid.origin) + layer * grid.spacing[2] * np.asarray(grid.direction)[:, 2]
+        places = dataclasses.replace(grid, origin=tuple(origin), size=(*grid.size[:2], 1)).points()[0] + values
+        voxels = (places - of_image.origin) @ np.asarray(of_image.direction) / of_image.spacing
+        is_outside = ((voxels < -0.5) | (voxels > np.asarray(of_image.size) - 0.5)).any(axis=-1)
+        is_near = ((places >= low) & (places <= high)).all(axis=-1)
+        there = places[is_outside & is_near]
+        if len(there):
+            found += int((_located(mesh, 1e-3 * _SIGNS[axes] * there)["distance"] == 0.0).sum())
+    return found
 
 
 def grid_for_warping(image: Any) -> Grid:

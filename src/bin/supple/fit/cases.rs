@@ -11,6 +11,7 @@ use super::points::Followed;
 use crate::problem::Problem;
 use crate::report::simulation::shape;
 use crate::rest::{Unrest, at_rest};
+use crate::results::warnings;
 use crate::run::Running;
 use crate::run::start::Start;
 use crate::scene::file::SceneFile;
@@ -37,11 +38,19 @@ pub(crate) struct Case {
     pub(crate) rest: f64,
 }
 
+/// What a simulation came to.
+struct Simulated {
+    /// Of the samples, m.
+    displacements: Vec<[f64; 3]>,
+    /// Why it may be off, in sentences.
+    doubts: Vec<String>,
+}
+
 /// All cases of a fit, with what has been simulated so far.
 pub(crate) struct Cases<'a> {
     pub(crate) all: Vec<Case>,
     unknowns: &'a [Unknown],
-    done: HashMap<(usize, String, u64), Vec<[f64; 3]>>,
+    done: HashMap<(usize, String, u64), Simulated>,
     /// The latest states at rest, from which the next ones begin.
     shapes: Vec<Option<Vec<[f32; 3]>>>,
     pub(crate) simulations: u32,
@@ -91,32 +100,41 @@ impl<'a> Cases<'a> {
 
     /// Displacements (m) of the samples of a case. Each simulation counts.
     pub(crate) fn displacements(&mut self, index: usize, values: &[f64]) -> Result<Vec<[f64; 3]>, Problem> {
+        Ok(self.simulated(index, values)?.displacements.clone())
+    }
+
+    /// Why the simulation of a case may be off, in sentences.
+    pub(crate) fn doubts(&mut self, index: usize, values: &[f64]) -> Result<Vec<String>, Problem> {
+        Ok(self.simulated(index, values)?.doubts.clone())
+    }
+
+    fn simulated(&mut self, index: usize, values: &[f64]) -> Result<&Simulated, Problem> {
         let case = &self.all[index];
         let (text, _) = self.text(case, values)?;
         let mut of_clock = self.unknowns.iter().zip(values).filter(|(unknown, _)| unknown.place.is_clock());
         let clock = of_clock.find(|(unknown, _)| case.has(unknown)).map_or(0.0, |(_, value)| *value);
         let key = (index, text, clock.to_bits());
-        if let Some(done) = self.done.get(&key) {
-            return Ok(done.clone());
-        }
-        self.simulations += 1;
-        let setup = Setup::read(&SceneFile::of_text(case.file.path(), key.1.clone())?)?;
-        let found = if case.samples.iter().any(|sample| sample.time.is_some()) {
-            case.over_time(&setup, clock)?
-        } else {
-            let from = self.shapes[index].as_deref();
-            let shape = match at_rest(&setup, from, case.rest) {
-                // From a shape of other values it may be too far.
-                Err(Unrest::Diverged(_)) if from.is_some() => at_rest(&setup, None, case.rest),
-                found => found,
+        if !self.done.contains_key(&key) {
+            self.simulations += 1;
+            let setup = Setup::read(&SceneFile::of_text(case.file.path(), key.1.clone())?)?;
+            let found = if case.samples.iter().any(|sample| sample.time.is_some()) {
+                case.over_time(&setup, clock)?
+            } else {
+                let from = self.shapes[index].as_deref();
+                let shape = match at_rest(&setup, from, case.rest) {
+                    // From a shape of other values it may be too far.
+                    Err(Unrest::Diverged(_)) if from.is_some() => at_rest(&setup, None, case.rest),
+                    found => found,
+                };
+                let shape = shape.map_err(|unrest| unrest.of(&case.name))?;
+                let displacements = case.points.iter().map(|point| point.displacement(&shape)).collect();
+                self.shapes[index] = Some(shape);
+                // Steps to rest are exact, and tissue that they crush is refused.
+                Simulated { displacements, doubts: vec![] }
             };
-            let shape = shape.map_err(|unrest| unrest.of(&case.name))?;
-            let found = case.points.iter().map(|point| point.displacement(&shape)).collect();
-            self.shapes[index] = Some(shape);
-            found
-        };
-        self.done.insert(key, found.clone());
-        Ok(found)
+            self.done.insert(key.clone(), found);
+        }
+        Ok(&self.done[&key])
     }
 }
 
@@ -153,20 +171,23 @@ impl Case {
             );
             return Err(fit.problem(&table.measured, message));
         }
+        let mut warnings = setup.warnings;
+        let length =
+            |sample: &Sample| sample.displacement.iter().flatten().map(|metre| metre * metre).sum::<f64>().sqrt();
+        let farthest = samples.iter().map(|sample| (length(sample), &sample.name)).max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((metre, name)) = farthest.filter(|(metre, _)| *metre > setup.body.diagonal()) {
+            let message = format!(
+                "the displacement of {name} is {:.0} mm, the body is {:.0} mm across; displacements are in metres (1 mm is 0.001)",
+                1e3 * metre,
+                1e3 * setup.body.diagonal()
+            );
+            warnings.push(fit.problem(&table.measured, message).0);
+        }
         let measured = samples.iter().flat_map(|sample| sample.displacement).flatten();
         let squares: Vec<f64> = measured.map(|metre| metre * metre).collect();
         let rest = (REST * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()).max(LEAST_REST);
         let name = table.scene.get_ref().display().to_string();
-        Ok(Self {
-            name,
-            file,
-            scene: table.scene.get_ref().clone(),
-            samples,
-            left_out,
-            points,
-            warnings: setup.warnings,
-            rest,
-        })
+        Ok(Self { name, file, scene: table.scene.get_ref().clone(), samples, left_out, points, warnings, rest })
     }
 
     /// Whether a value is one of this case.
@@ -176,19 +197,30 @@ impl Case {
 
     /// Displacements of the samples at their times, with all that acts in the scene and by its method, which starts at
     /// `clock` (s) of these.
-    fn over_time(&self, setup: &Setup, clock: f64) -> Result<Vec<[f64; 3]>, Problem> {
+    fn over_time(&self, setup: &Setup, clock: f64) -> Result<Simulated, Problem> {
         let mut running = Running::begin(setup, Start::new(setup, false)?, &|_| ())?;
         let time = |index: usize| (self.samples[index].time.unwrap_or_default() - clock).max(0.0);
         let mut order: Vec<usize> = (0..self.samples.len()).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
-        let mut found = vec![[0.0; 3]; self.samples.len()];
+        let mut displacements = vec![[0.0; 3]; self.samples.len()];
         for index in order {
             running.reach(time(index), f64::INFINITY)?;
             if let Some(divergence) = running.outcome.divergence {
                 return Err(Problem(format!("{}: the simulation {divergence}", self.name)));
             }
-            found[index] = self.points[index].displacement(&shape(running.simulation.state()));
+            displacements[index] = self.points[index].displacement(&shape(running.simulation.state()));
         }
-        Ok(found)
+        let status = running.outcome.status();
+        let remedy = match status {
+            "inexact" => {
+                "; write method = \"exact\" under [time], or \"auto\" with a tolerance well below the residuals"
+            }
+            _ => "",
+        };
+        let doubt = |doubt| format!("{} with the values found ({status}): {doubt}{remedy}", self.name);
+        Ok(Simulated {
+            displacements,
+            doubts: warnings::of_run(setup, &running.outcome).into_iter().map(doubt).collect(),
+        })
     }
 }

@@ -61,8 +61,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Sample>, Problem> {
         let [x, y, z] = point.map(number);
         let [ux, uy, uz] = displacement.map(maybe);
         let (point, time) = ([x?, y?, z?], time.map(number).transpose()?);
-        if let Some(time) = time.filter(|time| *time <= 0.0) {
-            return Err(problem(format!("time_s is {time}, it must be positive: the body is undeformed at 0")));
+        if let Some(time) = time.filter(|time| *time < 0.0) {
+            return Err(problem(format!("time_s is {time}, it must be zero or more: the scene starts at 0")));
         }
         let mm = point.map(|metre| (1e4 * metre).round() / 10.0);
         let name = name.map_or_else(|| format!("({}, {}, {}) mm", mm[0], mm[1], mm[2]), |name| cells[name].to_owned());

@@ -19,6 +19,8 @@ use crate::problem::Problem;
 
 /// The step of finite differences, as a share of the start value: far above what is left of the way to rest.
 const DIFFERENCE: f64 = 0.05;
+/// The same where that one moves nothing beyond the noise, as of a tissue that hardly changes its volume.
+const LARGE_DIFFERENCE: f64 = 0.5;
 /// How near to the best values is near enough, in standard errors.
 const NEAR: f64 = 0.2;
 /// The same as a share of the value, for data without noise.
@@ -78,7 +80,11 @@ pub(crate) fn solve(unknowns: &[Unknown], noise: f64, residuals: &mut Residuals<
             break;
         }
     }
-    let at_limit = (0..axes.len()).map(|index| !search.free.contains(&index)).collect();
+    // One that has gone there stays there where nothing tells whether it wants to go further.
+    let stays = |index: usize| axes[index].is_at_limit(here.x[index]).is_some() && here.x[index] != 1.0;
+    let is_still = |index: usize| jacobian.column(index).norm() == 0.0;
+    let is_at_limit = |index| !search.free.contains(&index) || (is_still(index) && stays(index));
+    let at_limit = (0..axes.len()).map(is_at_limit).collect();
     let values = values(&axes, &here.x);
     // From the coordinates of the search to the values.
     for (index, axis) in axes.iter().enumerate() {
@@ -166,15 +172,19 @@ impl Search<'_, '_> {
         for (index, axis) in self.axes.iter().enumerate() {
             let [least, most] = axis.limits;
             let x = here.x[index].clamp(least, most);
-            let wanted = DIFFERENCE * x.abs().clamp(DIFFERENCE, 1.0);
             let room = (most - x).max(x - least);
-            let step = wanted.min(room) * if most - x >= x - least { 1.0 } else { -1.0 };
-            let mut there = here.x.clone();
-            there[index] = x + step;
-            let residuals = (self.residuals)(&values(self.axes, &there))?;
-            let difference = residuals - &here.residuals;
-            let is_noise = difference.norm() <= self.noise;
-            columns.push(if is_noise { 0.0 * difference } else { difference / step });
+            let mut to = |wanted: f64| {
+                let step = wanted.min(room) * if most - x >= x - least { 1.0 } else { -1.0 };
+                let mut there = here.x.clone();
+                there[index] = x + step;
+                let difference = (self.residuals)(&values(self.axes, &there))? - &here.residuals;
+                Ok((difference.norm() > self.noise).then(|| difference / step))
+            };
+            let column = match to(DIFFERENCE * x.abs().clamp(DIFFERENCE, 1.0))? {
+                None => to(LARGE_DIFFERENCE).unwrap_or_default(),
+                column => column,
+            };
+            columns.push(column.unwrap_or_else(|| 0.0 * &here.residuals));
         }
         Ok(DMatrix::from_columns(&columns))
     }
@@ -190,12 +200,13 @@ impl Search<'_, '_> {
 
     /// Whether the best values of the linear model are as near as asked.
     fn is_near(&self, here: &Point, jacobian: &DMatrix<f64>) -> bool {
-        let columns = jacobian.select_columns(&self.free);
+        let moving: Vec<usize> = self.free.iter().copied().filter(|&free| jacobian.column(free).norm() > 0.0).collect();
+        let columns = jacobian.select_columns(&moving);
         let Some(inverse) = (columns.transpose() * &columns).try_inverse() else { return true };
         let step = -(&inverse * columns.transpose() * &here.residuals);
-        let count = here.residuals.len().saturating_sub(self.free.len()).max(1);
+        let count = here.residuals.len().saturating_sub(moving.len()).max(1);
         let variance = here.residuals.norm_squared() / count as f64;
-        self.free.iter().enumerate().all(|(index, &place)| {
+        moving.iter().enumerate().all(|(index, &place)| {
             let [least, most] = self.axes[place].limits;
             let step = (here.x[place] + step[index]).clamp(least, most) - here.x[place];
             let near = (1.5 * NEAR * (variance * inverse[(index, index)]).sqrt()).max(NEAR_SHARE * here.x[place].abs());

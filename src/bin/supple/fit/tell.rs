@@ -12,23 +12,42 @@ use super::statistics::{Statistics, short};
 use crate::problem::Problem;
 use crate::screen::{message, output, row};
 
+/// Residuals above this share of what was measured are warned of.
+const MOST_MISSED: f64 = 1.0 / 3.0;
+
 /// Distances of points, simulated from measured, m.
 #[derive(Default)]
 struct Distances {
     squares: Vec<f64>,
+    /// Of the displacements that were measured.
+    measured: Vec<f64>,
     worst: (f64, String),
 }
 
 impl Distances {
-    fn add(&mut self, metre: f64, name: &str) {
+    fn add(&mut self, metre: f64, measured: f64, name: &str) {
         self.squares.push(metre * metre);
+        self.measured.push(measured * measured);
         if metre >= self.worst.0 {
             self.worst = (metre, name.to_owned());
         }
     }
 
     fn rms(&self) -> Option<f64> {
-        (!self.squares.is_empty()).then(|| (self.squares.iter().sum::<f64>() / self.squares.len() as f64).sqrt())
+        rms(&self.squares)
+    }
+
+    /// That much of what was measured is missed.
+    fn doubt(&self, name: &str) -> Option<String> {
+        let (missed, measured) = (self.rms()?, rms(&self.measured)?);
+        (missed > MOST_MISSED * measured).then(|| {
+            format!(
+                "{name}: the points are {:.2} mm rms from where they were measured, and have moved by {:.2} mm; is what was measured in \
+                 metres, displacements and not places, and are the loads in the scene those that acted?",
+                MM * missed,
+                MM * measured
+            )
+        })
     }
 
     fn words(&self) -> String {
@@ -46,10 +65,14 @@ impl Distances {
     }
 }
 
+fn rms(squares: &[f64]) -> Option<f64> {
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
 /// A result that can be told.
 pub(crate) struct Told {
     rows: Vec<(String, String)>,
-    untold: Vec<String>,
+    warnings: Vec<String>,
     json: Value,
 }
 
@@ -94,6 +117,12 @@ impl Told {
             rows.push(("left out".into(), left_out.words()));
         }
         rows.push(("simulations".into(), cases.simulations.to_string()));
+        let mut doubts = vec![];
+        for index in 0..cases.all.len() {
+            doubts.extend(cases.doubts(index, &solution.values)?);
+            let (name, distances, _) = &of_cases[index];
+            doubts.extend(distances.doubt(name));
+        }
         let mut untold = statistics.untold.clone();
         if !solution.converged {
             untold.push("the search ended before the best values; start it from these".into());
@@ -104,6 +133,7 @@ impl Told {
             "parameters": parameters,
             "correlations": correlations,
             "cannot_tell": untold,
+            "warnings": cases.warnings.iter().chain(&doubts).collect::<Vec<_>>(),
             "converged": solution.converged,
             "residuals": fitted.json(),
             "left_out": left_out.json(),
@@ -111,7 +141,7 @@ impl Told {
             "simulations": cases.simulations,
             "cases": of_cases.into_iter().map(|(_, _, json)| json).collect::<Vec<_>>(),
         });
-        Ok(Self { rows, untold, json })
+        Ok(Self { rows, warnings: doubts.into_iter().chain(untold).collect(), json })
     }
 
     pub(crate) fn print(&self) {
@@ -123,7 +153,7 @@ impl Told {
                 row(name, words);
             }
         }
-        for sentence in &self.untold {
+        for sentence in &self.warnings {
             message!("warning: {sentence}");
         }
     }
@@ -152,10 +182,14 @@ fn distances(cases: &mut Cases<'_>, solution: &Solution) -> Result<(Distances, D
                 continue;
             }
             let distance = squares.iter().sum::<f64>().sqrt();
+            let moved = sample.displacement.iter().flatten().map(|metre| metre * metre).sum::<f64>().sqrt();
             let time = sample.time.map_or(String::new(), |time| format!(" at {time} s"));
-            own.add(distance, &format!("{}{time}", sample.name));
-            if *is_out { &mut left_out } else { &mut fitted }
-                .add(distance, &format!("{}{time} of {}", sample.name, case.name));
+            own.add(distance, moved, &format!("{}{time}", sample.name));
+            if *is_out { &mut left_out } else { &mut fitted }.add(
+                distance,
+                moved,
+                &format!("{}{time} of {}", sample.name, case.name),
+            );
             points.push(json!({
                 "name": sample.name, "time_s": sample.time, "left_out": is_out,
                 "measured_m": sample.displacement, "simulated_m": simulated, "distance_m": distance,

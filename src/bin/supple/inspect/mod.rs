@@ -47,6 +47,9 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         return network::inspect(path);
     }
     let body = Body::read(path, 1.0, Winding::Checked)?;
+    if let Some(remark) = body.unused_remark() {
+        output!("warning: {remark}");
+    }
     mesh::describe(&body)?;
     if let Some(remark) = size_remark(&body) {
         output!("warning: {}", Problem::in_file(path, remark));

@@ -14,9 +14,21 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     if setup.tissues.relax() {
         warnings.push("the frames have no von Mises stress: it is not known of tissue that relaxes".into());
     }
+    warnings.extend(of_run(setup, outcome));
+    warnings
+}
+
+/// Of what became of the scene alone.
+pub(crate) fn of_run(setup: &Setup, outcome: &Outcome) -> Vec<String> {
+    let mut warnings = vec![];
     if let Some(settled) = outcome.settled.filter(|settled| !settled.at_rest) {
+        let remedy = if setup.is_free() {
+            "nothing holds it"
+        } else {
+            "write a larger settle, or leave it out and let damping bring the body to rest before what you look at"
+        };
         let to_go = match settled.remaining {
-            metre if metre.is_finite() => format!(", {metre:.2e} m to go; a body that no support holds never is"),
+            metre if metre.is_finite() => format!(", {metre:.2e} m to go; {remedy}"),
             _ => String::new(),
         };
         warnings.push(format!("the body is not at rest after {} steps{to_go}", settled.steps));

@@ -21,6 +21,8 @@ pub struct Body {
     pub(crate) centre: [f64; 3],
     pub(crate) winding: Winding,
     pub(crate) name: String,
+    /// Nodes of the file that belong to no element and are left out, in its numbers.
+    pub(crate) unused: Vec<usize>,
 }
 
 fn relative(point: [f64; 3], centre: [f64; 3]) -> [f32; 3] {
@@ -33,14 +35,15 @@ impl Body {
         for point in &mut mesh.points {
             *point = point.map(|component| component * scale);
         }
-        Ok(Self::new(mesh, winding, path.display().to_string()))
+        let unused = leave_out_unused(&mut mesh);
+        Ok(Self { unused, ..Self::new(mesh, winding, path.display().to_string()) })
     }
 
     pub(crate) fn new(mesh: TetMesh, winding: Winding, name: String) -> Self {
         let (low, high) = extent(&mesh.points);
         let centre = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
         let local = mesh.points.iter().map(|&point| relative(point, centre)).collect();
-        Self { mesh, found_at: None, local, centre, winding, name }
+        Self { mesh, found_at: None, local, centre, winding, name, unused: vec![] }
     }
 
     /// The same body with its nodes elsewhere (m), about the same centre. Boxes, planes and walls find them where they were.
@@ -84,10 +87,19 @@ impl Body {
                     self.mesh.tets.len()
                 )
             }
-            MeshError::UnusedNode { .. } => "; remove it, it has no mass and cannot move".into(),
             _ => String::new(),
         };
         Problem(format!("{}: {error}{advice}", self.name))
+    }
+
+    /// What there is to say of nodes that are left out.
+    pub(crate) fn unused_remark(&self) -> Option<String> {
+        let first = self.unused.first()?;
+        Some(format!(
+            "{}: nodes that belong to no element are left out: {}, the first is {first}; results number the others without them",
+            self.name,
+            self.unused.len()
+        ))
     }
 
     pub(crate) fn diagonal(&self) -> f64 {
@@ -126,6 +138,21 @@ impl Body {
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
         boundary(self.mesh.tets.iter().copied())
     }
+}
+
+/// Removes the points that belong to no tetrahedron, and the triangles, which a body has no use for. Gives their numbers.
+fn leave_out_unused(mesh: &mut TetMesh) -> Vec<usize> {
+    let mut numbers = vec![None; mesh.points.len()];
+    mesh.tets.as_flattened().iter().for_each(|&node| numbers[node as usize] = Some(0));
+    let unused: Vec<usize> = (0..numbers.len()).filter(|&node| numbers[node].is_none()).collect();
+    if !unused.is_empty() {
+        numbers.iter_mut().flatten().zip(0..).for_each(|(number, new)| *number = new);
+        let mut is_used = numbers.iter().map(Option::is_some);
+        mesh.points.retain(|_| is_used.next() == Some(true));
+        mesh.tets.as_flattened_mut().iter_mut().for_each(|node| *node = numbers[*node as usize].unwrap_or_default());
+        mesh.triangles.clear();
+    }
+    unused
 }
 
 /// Signed volume of a tetrahedron, m^3.
@@ -174,6 +201,17 @@ pub(crate) fn read_body(file: &SceneFile, at: &Spanned<MeshTable>) -> Result<Bod
         (Some(path), None) => {
             let body = Body::read(&file.resolve(path.get_ref()), scale, winding)
                 .map_err(|problem| file.problem(path, problem))?;
+            let last_named = file.named_nodes().max();
+            if let Some(node) =
+                body.unused.first().filter(|first| last_named.is_some_and(|last| last as usize >= **first))
+            {
+                let message = format!(
+                    "{}: node {node} belongs to no element; remove it from the mesh: without it the numbers in nodes = [...] are those of \
+                     others",
+                    body.name
+                );
+                return Err(file.problem(path, message));
+            }
             body.checked().map_err(|problem| file.problem(path, problem))?;
             Ok(body)
         }

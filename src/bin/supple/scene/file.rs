@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -201,6 +202,24 @@ impl SceneFile {
     /// The path of a mesh or weight file, which is named relative to the scene file.
     pub(crate) fn resolve(&self, file: &Path) -> PathBuf {
         self.path.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file))
+    }
+
+    /// What entries select nodes by, each with where it stands.
+    pub(crate) fn selections(&self) -> impl Iterator<Item = (Range<usize>, Selection<'_>)> {
+        let scene = &self.scene;
+        let fixes = scene.fix.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let forces = scene.force.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let masses = scene.mass.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let motions = scene.motion.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let tractions = scene.traction.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let pressures = scene.pressure.iter().map(|at| (at.span(), at.get_ref().selection()));
+        let springs = scene.spring.iter().map(|at| (at.span(), at.get_ref().selection()));
+        fixes.chain(forces).chain(masses).chain(motions).chain(tractions).chain(pressures).chain(springs)
+    }
+
+    /// The nodes that entries name by their numbers.
+    pub(crate) fn named_nodes(&self) -> impl Iterator<Item = u32> {
+        self.selections().filter_map(|(_, selection)| selection.nodes).flat_map(|nodes| nodes.get_ref().iter().copied())
     }
 
     /// The scene's gravity, wherever TOML put it; none is zero.

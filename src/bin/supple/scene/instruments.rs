@@ -6,11 +6,13 @@ use serde::Deserialize;
 use supple::contact::{
     Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode, passes_between,
 };
-use supple::points::VecPoints;
+use supple::points::{FollowedPoint, VecPoints};
+use supple::scene::{Axes, Support};
 use toml::Spanned;
 
 use super::body::Body;
 use super::file::SceneFile;
+use super::select::ON_PLANE;
 use crate::field::read_surface;
 use crate::problem::Problem;
 
@@ -98,20 +100,47 @@ impl SceneInstruments {
             return Err(file.problem(first, "learned steps cannot meet instruments; method = \"long\" can"));
         }
         let all: Vec<_> = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
-        let axes: Vec<_> = all.iter().map(MovedInstrument::axis).collect();
-        let places = axes.concat();
-        if !places.is_empty() {
-            let located = VecPoints::locate(&body.checked()?, &places).map_err(Problem::of)?;
-            let mut points = located.points();
-            for (at, axis) in tables.iter().zip(&axes) {
-                let own = points.split_off(..axis.len()).unwrap_or_default();
-                if own.iter().any(|point| point.distance == 0.0) {
-                    let message = "this instrument starts inside the body; let its path begin outside";
+        Ok(Self::new(all, body))
+    }
+
+    /// Instruments that overlap the body where they start, with the place of their entry. One whose axis does is refused: it has no side
+    /// to push the tissue to. Nodes that `supports` hold meet no instrument.
+    pub(crate) fn warnings(&self, file: &SceneFile, body: &Body, supports: &[Support]) -> Result<Vec<String>, Problem> {
+        let mut held = vec![Axes::NONE; body.local.len()];
+        for support in supports {
+            held[support.node as usize] = held[support.node as usize].union(support.axes);
+        }
+        let is_free = |node: u32| held[node as usize] != Axes::XYZ;
+        let mut warnings = vec![];
+        for (at, instrument) in file.scene.instrument.iter().zip(&self.all) {
+            let placed = instrument.at(0.0);
+            let depths =
+                self.nodes.iter().filter(|node| is_free(node.node)).map(|node| -placed.distance(node.rest, 0.0));
+            let mut depth = depths.fold(f32::NEG_INFINITY, f32::max);
+            let axis = instrument.axis();
+            if !axis.is_empty() {
+                let located = VecPoints::locate(&body.checked()?, &axis).map_err(Problem::of)?;
+                if located.points().iter().any(|point| point.distance == 0.0) {
+                    let message = "the axis of this instrument starts inside the body; let its path begin outside";
                     return Err(file.problem(at, message));
                 }
+                let is_free = |point: &&FollowedPoint| {
+                    point.nodes.iter().zip(point.weights).any(|(&node, weight)| weight > 1e-3 && is_free(node))
+                };
+                let touched = located.points().iter().filter(|_| !self.triangles.is_empty()).filter(is_free);
+                let depths = touched.map(|point| instrument.shape.shape().thickness() - point.distance);
+                depth = depths.fold(depth, f32::max);
+            }
+            if depth > instrument.rounding(body) {
+                let what_moves = match file.scene.time.get_ref().settle {
+                    Some(_) => "settle has to move the tissue out of it",
+                    None => "the tissue jumps out of it in the first step; let its path begin outside",
+                };
+                let message = format!("this instrument starts {:.3} mm inside the body: {what_moves}", 1e3 * depth);
+                warnings.push(file.problem(at, message).0);
             }
         }
-        Ok(Self::new(all, body))
+        Ok(warnings)
     }
 
     pub const fn is_empty(&self) -> bool {
@@ -169,19 +198,28 @@ impl MovedInstrument {
         Ok(instrument)
     }
 
-    /// Points of its axis where it starts, m from the centre of the body; none of a plane and of a field, which may start
-    /// inside another way.
+    /// Points of its axis where it starts, m from the centre of the body; a plane and a field have none.
     fn axis(&self) -> Vec<[f32; 3]> {
         let half = match self.shape {
             OwnedShape::Sphere { .. } => 0.0,
             OwnedShape::Capsule { length, .. } => 0.5 * length,
             OwnedShape::Plane | OwnedShape::Field(_) => return vec![],
         };
-        let (start, along) = (self.path[0].1, self.direction);
+        let (start, along) = (self.placed(0.0).0, self.direction);
         let length = along.iter().map(|component| component * component).sum::<f32>().sqrt();
-        let places: &[f32] = if half > 0.0 { &[-1.0, -0.5, 0.0, 0.5, 1.0] } else { &[0.0] };
-        let at = |place: &f32| [0, 1, 2].map(|axis| start[axis] + half * place / length * along[axis]);
-        places.iter().map(at).collect()
+        // Not farther apart than half its radius.
+        let parts = (4.0 * half / self.shape.shape().thickness()).ceil().min(1e3) as u32;
+        let share = |part: u32| if parts > 0 { 2.0 * part as f32 / parts as f32 - 1.0 } else { 0.0 };
+        let at = |part: u32| [0, 1, 2].map(|axis| start[axis] + half * share(part) / length * along[axis]);
+        (0..=parts).map(at).collect()
+    }
+
+    /// How deep in it a node may be by the rounding of meshes, or of the grid of a field, m.
+    fn rounding(&self, body: &Body) -> f32 {
+        match &self.shape {
+            OwnedShape::Field(owned) => owned.field.spacing,
+            _ => (ON_PLANE * body.diagonal()) as f32,
+        }
     }
 
     fn pose(&self, position: [f32; 3]) -> Pose {

@@ -72,7 +72,6 @@ pub(crate) fn loose_part(file: &SceneFile, body: &Body, held: impl Iterator<Item
     for node in held {
         holds[root(&mut towards, node) as usize] = true;
     }
-    // A mesh with nodes that belong to no element is refused.
     let mut nodes = vec![0_usize; towards.len()];
     for node in 0..towards.len() as u32 {
         nodes[root(&mut towards, node) as usize] += 1;

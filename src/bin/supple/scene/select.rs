@@ -8,7 +8,7 @@ use crate::problem::Problem;
 
 /// How far from a plane a node may be and still lie on it, as a share of the body's diagonal: more than the
 /// rounding of mesh files, less than any element.
-const ON_PLANE: f64 = 1e-5;
+pub(super) const ON_PLANE: f64 = 1e-5;
 
 /// The nodes an entry is about; none is an error.
 pub(crate) fn select<T>(

@@ -76,12 +76,14 @@ impl Setup {
         let points = ScenePoints::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
+        warnings.extend(body.unused_remark());
         let held = supports.iter().map(|support| support.node).chain(pulls.pulled_nodes());
         warnings.extend(plausible::loose_part(file, &body, held));
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
         warnings.extend(time.old_name.clone());
+        warnings.extend(instruments.warnings(file, &body, &supports)?);
         warnings.extend(points.warnings(file));
         warnings.extend(pulls.warnings(file, &supports));
         if let Some(learned) = &learned {
@@ -95,7 +97,7 @@ impl Setup {
                 return Err(file.problem(&scene.material, message));
             }
         }
-        Ok(Self {
+        let mut setup = Self {
             body,
             tissues,
             element,
@@ -112,7 +114,12 @@ impl Setup {
             time,
             learned,
             warnings,
-        })
+        };
+        if setup.is_free() && (setup.gravity != [0.0; 3] || !setup.forces.is_empty()) {
+            let message = "nothing holds the body: it goes where gravity and forces take it; [[fix]], [[spring]] or [[pull]] hold one";
+            setup.warnings.push(Problem::in_file(file.path(), message).0);
+        }
+        Ok(setup)
     }
 
     /// The lobe of `supple demo`, which has no scene file.
@@ -205,6 +212,16 @@ impl Setup {
             loads = loads.pulled_by(self.pulls.pulling(pulls, nodes)?);
         }
         Ok(loads)
+    }
+
+    /// Whether neither supports nor springs and pulls hold it, and no instrument could.
+    pub(crate) fn is_free(&self) -> bool {
+        self.supports.is_empty() && self.pulls.len() == 0 && self.instruments.is_empty()
+    }
+
+    /// The mass of the tissue and of what hangs on it, kg.
+    pub(crate) fn mass(&self, scene: SceneView<'_, VecMaterial>) -> f64 {
+        scene.mass() + self.masses.iter().map(|(_, kilogram)| f64::from(*kilogram)).sum::<f64>()
     }
 
     /// The longest time over which a load rises, s.

@@ -113,9 +113,9 @@ impl Timing {
         matches!(self.step, StepChoice::Auto) && !self.is_adaptive
     }
 
-    /// Refuses a step beyond the end.
+    /// Refuses a step beyond the end, which is rounded as the step is: 0.1 in float32 is above 0.1 in float64.
     pub(crate) fn check_length(&self, seconds: f32) -> Result<(), Problem> {
-        if f64::from(seconds) <= self.end {
+        if seconds <= self.end as f32 {
             return Ok(());
         }
         Err(Problem(format!("{}: the step of {seconds} s is longer than the end, {} s", self.step_at, self.end)))

@@ -54,15 +54,8 @@ pub(super) fn mesh_without_loads(
 
 /// Boxes and planes that select other nodes there, and the nodes that they should.
 fn other_nodes(file: &SceneFile, image: &Body, found: &Body) -> Result<Vec<String>, Problem> {
-    let scene = &file.scene;
-    let fixes = scene.fix.iter().map(|at| (at.span(), at.get_ref().selection()));
-    let forces = scene.force.iter().map(|at| (at.span(), at.get_ref().selection()));
-    let masses = scene.mass.iter().map(|at| (at.span(), at.get_ref().selection()));
-    let tractions = scene.traction.iter().map(|at| (at.span(), at.get_ref().selection()));
-    let pressures = scene.pressure.iter().map(|at| (at.span(), at.get_ref().selection()));
-    let springs = scene.spring.iter().map(|at| (at.span(), at.get_ref().selection()));
     let mut remedies = vec![];
-    for (span, selection) in fixes.chain(forces).chain(masses).chain(tractions).chain(pressures).chain(springs) {
+    for (span, selection) in file.selections() {
         let at = Spanned::new(span, ());
         let nodes = select(file, &at, &selection, image)?;
         if select(file, &at, &selection, found).is_ok_and(|there| there == nodes) {
