@@ -54,6 +54,8 @@ pub struct Simulation<'w> {
     in_step: Vec<Motion>,
     /// None until the first call.
     pub(super) prepared: Option<Prepared<'w>>,
+    /// What has moved the state under other settings, until the next call knows what acts.
+    former: Option<Prepared<'w>>,
     clock: Clock,
 }
 
@@ -129,6 +131,7 @@ impl<'w> Simulation<'w> {
             changes: Changes::default(),
             in_step: vec![],
             prepared: None,
+            former: None,
             clock: Clock::default(),
         }
     }
@@ -142,21 +145,9 @@ impl<'w> Simulation<'w> {
 
     /// See [`Simulation::with`].
     pub fn set(&mut self, settings: Settings<'w>) {
-        if !matches!(settings.method, Method::Long(_)) {
-            self.end_long_steps();
-        }
+        self.former =
+            if matches!(settings.method, Method::Long(_)) { None } else { self.prepared.take().or(self.former.take()) };
         (self.settings, self.prepared) = (settings, None);
-    }
-
-    /// Lets the velocities be those at the time of the state, where long steps have brought it there.
-    fn end_long_steps(&mut self) {
-        let Ok(critical) = self.critical_step() else { return };
-        // With loads that cannot be, velocities stay as they are.
-        let Ok(Acting { mut loads, scene, state, prepared, .. }) = self.acting() else { return };
-        if let Some(prepared) = prepared {
-            let (mover, state) = (prepared.mover(), state.view());
-            mover.end_long_steps(critical.seconds, scene.view(), &mut loads, state, &CallingThread);
-        }
     }
 
     /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which
@@ -234,6 +225,11 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.ablate_on()?;
+        if let Some(mut former) = self.former.take() {
+            let critical = self.critical_step()?;
+            let Acting { mut loads, scene, state, .. } = self.acting()?;
+            former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), threads);
+        }
         self.prepare_once()?;
         let work = self.settings.work();
         let Acting { mut loads, scene, state, prepared, clock } = self.acting()?;
@@ -259,6 +255,10 @@ impl<'w> Simulation<'w> {
         watch: &mut dyn FnMut(Event<'_>),
     ) -> Result<Report, SimulationError> {
         self.ablate_on()?;
+        if let Some(mut former) = self.former.take() {
+            let (critical, Self { scene, state, .. }) = (self.critical_step()?, &mut *self);
+            former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), &CallingThread);
+        }
         self.prepare_once()?;
         let Self { scene, state, prepared, settings, .. } = self;
         let work = settings.work();
@@ -288,7 +288,7 @@ impl<'w> Simulation<'w> {
 
     /// The next call prepares the steps anew, from the state as it is.
     pub(super) fn forget_steps(&mut self) {
-        self.prepared = None;
+        (self.prepared, self.former) = (None, None);
     }
 
     fn prepare_once(&mut self) -> Result<(), SimulationError> {
