@@ -121,7 +121,10 @@ impl<'a> ContactMemory<'a> {
 
     /// Forgets the pushes of another state: it was restored or reset, or has gone on without instruments.
     pub(crate) fn forget_if_other(&mut self, progress: &Progress) {
-        if !self.follows(progress) {
+        let (steps, time, kinetic, _) = moment(progress);
+        let head = &*self.head;
+        // One that was put back to a peak of its energy is no other.
+        if (head.steps, head.time, head.kinetic) != (steps, time, kinetic) {
             self.before.fill(NodeVector::ZERO);
         }
     }

@@ -51,7 +51,7 @@
 //! An instrument that is thinner than edges are long meets triangles too ([`Surface::with_triangles`]): the push acts on the point of a
 //! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`, `src/step/triangles.rs`).
 //!
-//! Work: at most each node and triangle of the surface against each instrument in each step, and eight sweeps over the triangles that
+//! Work: at most each node and triangle of the surface against each instrument in each step, and eight sweeps over the nodes and triangles that
 //! touch. A state with room for pushes
 //! ([`StateView::pushing`](crate::state::StateView::pushing)) knows how near each node was, and looks only at those that instruments can
 //! reach (`clearance.rs`). Nodes that supports hold along all axes are passed through. A node that touches several instruments is moved by

@@ -39,15 +39,17 @@ impl<M: ElementMaterial> Trial<'_, M> {
         if self.refuses_speed(contact, placed) {
             return;
         }
+        let (surface, farthest) = (contact.surface().nodes(), totals.farthest);
+        // With triangles, nodes are solved for together with these, beginning from the pushes of the step before.
+        let has_triangles = !contact.surface().triangles().is_empty();
+        let mut moved = if has_triangles { self.push_as_before(contact, (step, method), totals) } else { 0.0 };
+        let alone = if has_triangles { 0 } else { surface.len() };
         let Self { pushes, progress, .. } = self;
-        let surface = contact.surface().nodes();
-        let farthest = totals.farthest;
         let limit = ContactMemory::split(pushes, &contact.surface())
             .map(|mut memory| memory.begin(progress, placed, farthest, 0.0));
         let mut touches = [Touch::default(); MOST_INSTRUMENTS];
-        // How far pushes move a node at the most, m.
-        let (mut from, mut moved) = (0, 0.0f32);
-        while let Some(place) = self.next_in_reach(from, limit).filter(|&place| place < surface.len()) {
+        let mut from = 0;
+        while let Some(place) = self.next_in_reach(from, limit).filter(|&place| place < alone) {
             from = place + 1;
             let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
             let (mut distance, mut pushes, mut way) = (f32::INFINITY, Vec3::ZERO, 0.0);
@@ -85,7 +87,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             moved = moved.max(self.push(&met, push, (step, index, method), totals, touch));
             self.keep_push(place, entry.node, f32::NEG_INFINITY, push);
         }
-        if !contact.surface().triangles().is_empty() {
+        if has_triangles {
             let limit = limit.map(|limit| limit + moved);
             self.meet_triangles(contact, (step, method), placed, (totals, &mut touches), limit);
         }

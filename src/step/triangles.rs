@@ -1,7 +1,8 @@
 //! Triangles of the surface in a step, which instruments touch at the point that is deepest in them: the push `p` there
 //! is a force `w_i p` on each corner, with the barycentric weights `w_i`, and the point moves by the mean of its
-//! corners. As triangles share nodes, exact steps find their pushes by projected Gauss-Seidel, a bounded number of
-//! sweeps over
+//! corners. As triangles share nodes, exact steps find the pushes on both by projected Gauss-Seidel, from those of the step before
+//! on: the points that are deepest are then those of where the tissue will be, and tissue at rest stays. A bounded number of
+//! sweeps goes over
 //!
 //! ```text
 //! p <- projection of  p - m r / c,   1/m = sum w_i^2 / m_i
@@ -19,10 +20,10 @@ use crate::contact::{
 use crate::element::ElementMaterial;
 use crate::simd::NodeVector;
 
-/// Sweeps over the triangles that touch.
+/// Sweeps over the nodes and triangles that touch.
 const SWEEPS: usize = 8;
-/// They end earlier where a sweep moves no point by more than this share of the deepest gap.
-const SETTLED: f32 = 1e-3;
+/// They end earlier where a sweep moves no point by more than this share of what the pushes move one.
+const SETTLED: f32 = 1e-4;
 
 /// Where the corners of a triangle will be, and how far they move in the step, m; a node three times.
 pub(super) struct Candidate {
@@ -153,8 +154,34 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    /// Adds the pushes on triangles to the forces, for methods whose next increment of a node follows from its force
-    /// and its mass alone, once those on nodes are there.
+    /// Adds the pushes of the step before to the forces. Gives how far that moves a node at the most, m.
+    pub(super) fn push_as_before(
+        &mut self,
+        contact: &Contact<'_>,
+        (step, method): (&Step, &impl StepMethod<M>),
+        totals: &mut Totals,
+    ) -> f32 {
+        self.follow_triangles(step);
+        let (surface, mut from, mut moved) = (contact.surface(), 0, 0.0f32);
+        while let Some(place) = self.memory().and_then(|memory| memory.next_in_reach(from, f32::MIN)) {
+            from = place + 1;
+            // A grip holds its node anew.
+            if contact.is_gripped(place) {
+                continue;
+            }
+            let push = self.memory().and_then(|memory| memory.before.get(place).copied()).unwrap_or_default();
+            for (node, share) in corners_of(&surface, place, &push) {
+                let before = axes(self.next_of(node, method));
+                if let Some(next) = self.add_force(node, share * axes(push.0), (step, method), totals) {
+                    moved = moved.max(axes(next).distance(before));
+                }
+            }
+        }
+        moved
+    }
+
+    /// Adds the changes of the pushes on nodes and triangles to the forces, for methods whose next increment of a node follows from
+    /// its force and its mass alone.
     pub(super) fn meet_triangles(
         &mut self,
         contact: &Contact<'_>,
@@ -164,7 +191,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         limit: Option<f32>,
     ) {
         let (surface, first) = (contact.surface(), self.touched);
-        let mut from = surface.nodes().len();
+        let mut from = 0;
         while let Some(place) = self.next_in_reach(from, limit) {
             from = place + 1;
             if contact.is_gripped(place) {
@@ -172,12 +199,12 @@ impl<M: ElementMaterial> Trial<'_, M> {
             }
             let Some(mut found) = self.found(&surface, place) else { continue };
             let candidate = self.candidate(&surface, &found, &|node| self.next_of(node, method));
-            let Nearest { distance, met } = candidate.nearest(&found, placed, (0.0, false));
+            let is_pushed = found.before != [0.0; 3];
+            let Nearest { distance, met } = candidate.nearest(&found, placed, (0.0, is_pushed));
             if let Some(mut memory) = self.memory() {
                 memory.note(place, distance - candidate.farthest());
             }
-            found.push = [0.0; 3];
-            if let Some((index, point, meeting)) = met.filter(|(.., meeting)| meeting.gap < 0.0) {
+            if let Some((index, point, meeting)) = met.filter(|(.., meeting)| meeting.gap < 0.0 || is_pushed) {
                 found.set_point(point);
                 let moved = point.mean(candidate.next);
                 let at = placed.get(index).map(|placed| (index, placed));
@@ -188,10 +215,14 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                 found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
                 found.instrument = index as u32;
-                found.scale = self.mass_at(&found, method);
-            } else if found.before == [0.0; 3] {
+            } else if is_pushed {
+                // All instruments are gone: no push.
+                let normal = Vec3::from_array(found.before).normalize_or(Vec3::Z);
+                (found.normal, found.vector) = (normal.to_array(), normal.to_array());
+            } else {
                 continue;
             }
+            found.scale = self.mass_at(&found, method);
             self.add_touched(found);
         }
         for _ in 0..SWEEPS {
@@ -209,7 +240,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 if let Some(place) = self.solver_room().touched.get_mut(at) {
                     *place = each;
                 }
-                most = [most[0].max(change.length() * step.push() / each.scale), most[1].max(-each.gap)];
+                let way = |push: Vec3| push.length() * step.push() / each.scale;
+                most = [most[0].max(way(change)), most[1].max(way(Vec3::from_array(each.push)))];
             }
             if most[0] <= SETTLED * most[1] {
                 break;
