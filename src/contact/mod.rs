@@ -55,7 +55,7 @@
 //! touch. A state with room for pushes
 //! ([`StateView::pushing`](crate::state::StateView::pushing)) knows how near each node was, and looks only at those that instruments can
 //! reach (`clearance.rs`). Nodes that supports hold along all axes are passed through. A node that touches several instruments is moved by
-//! one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light nodes on hard surfaces.
+//! one after the other, in long steps and where there are triangles by the nearest one. Damping of a few 1/s is what ends the rattling of light nodes on hard surfaces.
 
 mod clearance;
 mod field;
