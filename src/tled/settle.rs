@@ -61,7 +61,7 @@ const MOST_HALVINGS: u32 = 8;
 const SHORTEST: u32 = 8;
 /// Steps along gradients, at least, as a share of those of the first swing: each goes one element farther, and has not met all of a body
 /// before. And at most for each step of the longest swing.
-const LEAST_GRADIENTS: f32 = 0.5;
+const LEAST_GRADIENTS: f32 = 0.35;
 const MOST_GRADIENTS: u32 = 32;
 /// They end so much nearer to rest than asked for, by their own estimate, and are looked at by a swing, so many times at most.
 const CLOSER: f32 = 0.1;
