@@ -136,6 +136,7 @@ extern crate std;
 pub mod adaptive;
 #[cfg(feature = "capi-neo-hookean")]
 mod capi;
+mod checksum;
 pub mod contact;
 mod copy;
 pub mod element;

@@ -17,6 +17,7 @@ use core::ops::{Deref, Range};
 
 use glam::{DMat3, DVec3};
 
+use crate::checksum::OfTables;
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, FibreTangent, FibreTile, MOST_ELEMENTS, MoreEnergy,
     NodeInertia, PatchBuilder, PatchRow, Patches, Remembered, VolumeRows, element_energy, element_fields, patch_energy,
@@ -81,13 +82,13 @@ pub(crate) fn tissue_count(material: &impl Material) -> usize {
     }
 }
 
-/// CRC32 of all tables, to tell scenes of the same size apart.
+/// Of all tables, to tell scenes of the same size apart.
 fn checksum(element: Element, nodes: &[NodeInertia], tiles: &[ElementTile]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&element.code().to_le_bytes());
-    hasher.update(bytemuck::must_cast_slice(nodes));
-    hasher.update(bytemuck::must_cast_slice(tiles));
-    hasher.finalize()
+    let mut sum = OfTables::new();
+    sum.update(&element.code().to_le_bytes());
+    sum.update(bytemuck::must_cast_slice(nodes));
+    sum.update(bytemuck::must_cast_slice(tiles));
+    sum.number()
 }
 
 /// Sizes, mass and partitions of a scene: all that is known of it apart from its tables.

@@ -353,6 +353,7 @@ impl AdaptiveView<'_> {
     }
 
     /// See [`LargeView::shorten`](crate::inertia::LargeView::shorten), of the first run.
+    #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
     pub(crate) fn end_long_steps<M: ElementMaterial>(
         self,
         seconds: f32,

@@ -5,6 +5,7 @@ use core::{ptr, slice};
 
 use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
+use crate::checksum::OfTables;
 use crate::copy::copy;
 use crate::state::{MOVED_VECTORS, NodeVector, Progress};
 use crate::step::{EnergyBalance, EnergyCycle, Step};
@@ -26,7 +27,7 @@ const VERSION_THAT_REMEMBERS: u32 = 4;
 struct Front {
     magic: [u8; 8],
     version: u32,
-    /// CRC-32 of all that follows.
+    /// Of all that follows ([`OfTables`]).
     checksum: u32,
     nodes: u32,
     /// That the increments span, s.
@@ -229,8 +230,8 @@ fn check_finite(front: &Front, rest: &[u8], past: &Remembered, remembered: &[u8]
 }
 
 fn checksum(front: &Front, rest: &[u8]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(bytes_of(front).get(CHECKED..).unwrap_or_default());
-    hasher.update(rest);
-    hasher.finalize()
+    let mut sum = OfTables::new();
+    sum.update(bytes_of(front).get(CHECKED..).unwrap_or_default());
+    sum.update(rest);
+    sum.number()
 }

@@ -13,7 +13,7 @@ use crate::material::Element;
 use crate::mlp::Network;
 use crate::simulation::{Clock, Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Mover, usual_tolerance};
 use crate::state::NodeVector;
-use crate::step::{CallingThread, CriticalStep, Status, Step, Work};
+use crate::step::{CriticalStep, Status, Step, Work};
 use crate::tled::{Pace, vectors_for_pace};
 
 use super::SUPPLE_NONE;
@@ -723,7 +723,9 @@ unsafe fn end_long_steps(sim: *mut supple_sim, open: &OpenScene<'_>, critical: C
         let mut loads = CallLoads::of(objects.loads, open)?;
         let mut state = loads.attached(opened_of(open, objects.state)?);
         if let Ok(mover) = (*sim).prepared.mover(sim) {
-            mover.end_long_steps(critical.seconds, open.view(), &mut loads.of_call, state.reborrow(), &CallingThread);
+            // The calling thread alone; steps of its kind would be compiled a second time.
+            let threads = HostThreads::of(ptr::null())?;
+            mover.end_long_steps(critical.seconds, open.view(), &mut loads.of_call, state.reborrow(), &threads);
         }
         state.end_long_steps(critical);
         Ok(())

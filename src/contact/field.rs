@@ -7,6 +7,8 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use crate::checksum::OfTables;
+
 /// Signed distances on a grid, checked: finite, negative somewhere, positive all around.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Field<'a> {
@@ -67,7 +69,7 @@ struct Head {
     size: [u32; 3],
     origin: [f32; 3],
     spacing: f32,
-    /// CRC-32 of the values.
+    /// Of the values.
     checksum: u32,
     spare: [u32; 3],
 }
@@ -103,8 +105,9 @@ impl<'a> Field<'a> {
         if deepest <= 0.0 {
             return Err(FieldError::Empty);
         }
-        let checksum = crc32fast::hash(bytemuck::must_cast_slice(values));
-        Ok(Self { values, size, origin, spacing, deepest, checksum })
+        let mut sum = OfTables::new();
+        sum.update(bytemuck::must_cast_slice(values));
+        Ok(Self { values, size, origin, spacing, deepest, checksum: sum.number() })
     }
 
     /// The field in the bytes of a file, which are used where they are: aligned to four bytes.

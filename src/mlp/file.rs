@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable, try_cast_slice};
 
 use super::layers::{LayerEntry, LongEntry, Place, checked_layer};
 use super::{Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS};
+use crate::checksum::crc_32;
 use crate::material::{AnyLaw, Element, Law, MAX_CONSTANTS};
 
 #[cfg(target_endian = "big")]
@@ -315,7 +316,7 @@ impl<'w> Network<'w> {
             return Err(WeightError::Header { field: "the length", value: length as f32 });
         }
         let bytes = bytes.get(..length).ok_or(WeightError::Short { needed: length, bytes: bytes.len() })?;
-        let found = crc32fast::hash(bytes.get(CHECKED..).unwrap_or_default());
+        let found = crc_32(bytes.get(CHECKED..).unwrap_or_default());
         if found != header.checksum {
             return Err(WeightError::Checksum { stated: header.checksum, found });
         }

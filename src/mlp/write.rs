@@ -10,6 +10,7 @@ use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_IN
 use super::int8::{GROUP, TILE_ROWS, WeightTile};
 use super::layers::{LayerEntry, LongEntry};
 use super::{Activation, ForceInput, Layer, Network, Parameters, Range, WeightError};
+use crate::checksum::crc_32;
 use crate::material::{AnyLaw, Element, Law};
 
 /// A layer of a network to be written.
@@ -243,7 +244,7 @@ pub fn write_int8(description: &Description<'_>, int8: &[Option<Int8Description>
     place(&mut bytes, HEADER + size_of::<Range>() * inputs.len(), bytemuck::cast_slice(outputs));
     place(&mut bytes, HEADER + tables, &entries);
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
-    header.checksum = crc32fast::hash(&bytes[CHECKED..]);
+    header.checksum = crc_32(&bytes[CHECKED..]);
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
     Network::parse(WeightBytes::of(&bytes).bytes())?;
     Ok(bytes)

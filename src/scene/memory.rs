@@ -59,14 +59,14 @@ impl<'a, M: Material> SceneView<'a, M> {
     /// A checksum of what relaxes, in its order: memory of a state stays where it is in a scene with the same.
     #[cfg(feature = "capi-neo-hookean")]
     pub(crate) fn memory_checksum(&self) -> u32 {
-        let mut hasher = crc32fast::Hasher::new();
+        let mut sum = crate::checksum::OfTables::new();
         if self.memory_vectors() > 0 {
             match self.element().is_nodal_strain() {
-                true => self.patches.tiles().iter().for_each(|tile| hasher.update(bytemuck::bytes_of(tile))),
-                false => hasher.update(bytemuck::must_cast_slice(self.tiles)),
+                true => self.patches.tiles().iter().for_each(|tile| sum.update(bytemuck::bytes_of(tile))),
+                false => sum.update(bytemuck::must_cast_slice(self.tiles)),
             }
         }
-        hasher.finalize()
+        sum.number()
     }
 
     /// How tissue relaxes from the middle of the last step to that of the next, in step `step`; nothing if none does.

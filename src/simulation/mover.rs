@@ -145,6 +145,7 @@ impl Mover<'_, '_> {
     }
 }
 
+#[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
 impl Mover<'_, '_> {
     /// Steps of another kind follow, of about so many seconds: those beyond the critical one give the last increment the velocity
     /// at its end, under the loads as they are.
