@@ -56,6 +56,11 @@
 //! - Where inertia grows while velocities are kept, `1/2 v^T S v` grows as well. So where only a share of the lattice's
 //!   part is used, `1 - sqrt(share)` of `T c` and of the rough motion is removed. The same is done with kinetic energy
 //!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum.
+//! - Where a step is longer or shorter than the last one, `h`, its last increment is carried over as `D / h du`, and a force acts for
+//!   `(h + D) / 2`, as in exact steps, but for at most 1.25 `D`: the rest acts in the steps that follow (`pass_input.rs`).
+//! - Where steps of others, less than half as long, have brought the state, their vibrations are none of its velocity: added inertia
+//!   grows while momentum is kept, so all of `T c` and of the rough motion is removed but `(h / D)^2` (`step.rs`). Adaptive steps,
+//!   which lengthen where the motion is calm, carry all of it over: what follows bending would be lost as well.
 //! - Float32 cannot invert matrices that are too ill-conditioned. At the start that is an error
 //!   ([`InertiaError::Singular`]), or a coarser lattice where that is free. Later the lattice is not used until `S` is
 //!   computed again, with a [`Report::coarse_share`] of zero. If a step goes wrong all the same, the energy balance
