@@ -1,4 +1,5 @@
-//! Checksums: of files CRC-32 (ISO-HDLC, as in zip and PNG), of tables in memory a faster one.
+//! Checksums: of weights and fields CRC-32 (ISO-HDLC, as in zip and PNG), of scenes and saved states, which are made while a host
+//! waits, a faster one.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

@@ -48,8 +48,10 @@ pub(super) struct Control {
     half_life: f32,
     lengths: u32,
     halvings: u32,
-    /// Halvings with which the length is no longer than the present call.
+    /// Halvings with which the length is no longer than the present call, or half of the one before: a short call among others
+    /// changes nothing. And that, as a share of the longest length.
     of_call: u32,
+    call: f32,
     /// Since the latest change, or since a probe has begun or ended.
     seconds: f32,
     comparisons: u32,
@@ -86,6 +88,7 @@ impl Control {
             lengths,
             halvings: lengths,
             of_call: 0,
+            call: 0.0,
             seconds: 0.0,
             comparisons: 0,
             error: 0.0,
@@ -128,7 +131,8 @@ impl Control {
     /// A call begins that lasts so many times the longest length. No step is longer than a call, and the second run's steps
     /// belong to the length: with one far longer than that, it would be compared too seldom.
     pub(super) fn enter_call(&mut self, ratio: f32) {
-        let is_shorter = |&halvings: &u32| libm::exp2f(-(halvings as f32)) <= ratio;
+        self.call = ratio.max(0.5 * self.call);
+        let is_shorter = |&halvings: &u32| libm::exp2f(-(halvings as f32)) <= self.call;
         self.of_call = (0..self.lengths).find(is_shorter).unwrap_or(self.lengths);
     }
 

@@ -17,9 +17,9 @@ use super::vectors::overlap;
 use supple_status::*;
 
 const MAGIC: [u8; 8] = *b"SUPPLE-M";
-const VERSION: u32 = 3;
+const VERSION: u32 = 5;
 /// Of tissue that relaxes.
-const VERSION_THAT_REMEMBERS: u32 = 4;
+const VERSION_THAT_REMEMBERS: u32 = 6;
 
 /// Before displacements, their remainders and increments, four floats each.
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -217,7 +217,9 @@ impl<'a> ContactMemory<'a> {
 
     /// Notes how far a node or triangle was from all instruments at the least, m, at the start of the step.
     pub(crate) fn note(&mut self, place: usize, distance: f32) {
-        if let Some(threshold) = self.thresholds.get_mut(place) {
+        // One that was pushed stays in reach until the push is let go.
+        let is_pushed = self.before.get(place).is_some_and(|push| push.to_array() != [0.0; 3]);
+        if let Some(threshold) = self.thresholds.get_mut(place).filter(|_| !is_pushed) {
             *threshold = (self.head.travelled + f64::from(distance)) as f32;
         }
     }

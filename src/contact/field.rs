@@ -7,7 +7,7 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::checksum::OfTables;
+use crate::checksum::crc_32;
 
 /// Signed distances on a grid, checked: finite, negative somewhere, positive all around.
 #[derive(Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ struct Head {
     size: [u32; 3],
     origin: [f32; 3],
     spacing: f32,
-    /// Of the values.
+    /// CRC-32 of the values.
     checksum: u32,
     spare: [u32; 3],
 }
@@ -105,9 +105,8 @@ impl<'a> Field<'a> {
         if deepest <= 0.0 {
             return Err(FieldError::Empty);
         }
-        let mut sum = OfTables::new();
-        sum.update(bytemuck::must_cast_slice(values));
-        Ok(Self { values, size, origin, spacing, deepest, checksum: sum.number() })
+        let checksum = crc_32(bytemuck::must_cast_slice(values));
+        Ok(Self { values, size, origin, spacing, deepest, checksum })
     }
 
     /// The field in the bytes of a file, which are used where they are: aligned to four bytes.

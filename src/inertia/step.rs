@@ -31,9 +31,10 @@ use super::{ADDED_AT_LARGEST_STRAIN, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, 
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
-const MUCH_LONGER: f32 = 2.0;
 const LARGEST_UNUSED: f32 = 0.05;
 const LEAST_COARSE_SHARE: f32 = 0.8;
+/// Times the last step beyond which a step calms what that has left ([`LargeModel::follow`]).
+const MUCH_LONGER: f32 = 2.0;
 
 impl LargeView<'_> {
     /// See [`super::LargeStep::step`].

@@ -225,11 +225,6 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.ablate_on()?;
-        if let Some(mut former) = self.former.take() {
-            let critical = self.critical_step()?;
-            let Acting { mut loads, scene, state, .. } = self.acting()?;
-            former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), threads);
-        }
         self.prepare_once()?;
         let work = self.settings.work();
         let Acting { mut loads, scene, state, prepared, clock } = self.acting()?;
@@ -299,6 +294,10 @@ impl<'w> Simulation<'w> {
     /// is wrong with the settings is told.
     pub fn prepare(&mut self) -> Result<(), SimulationError> {
         let critical = self.critical_step()?;
+        if let Some(mut former) = self.former.take() {
+            let Acting { mut loads, scene, state, .. } = self.acting()?;
+            former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), &CallingThread);
+        }
         let Self { scene, state, points, settings, .. } = self;
         let Settings { step, damping, tolerance, unchecked, .. } = *settings;
         let nodes = scene.node_count();

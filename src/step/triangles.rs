@@ -24,6 +24,8 @@ use crate::simd::NodeVector;
 const SWEEPS: usize = 8;
 /// They end earlier where a sweep moves no point by more than this share of what the pushes move one.
 const SETTLED: f32 = 1e-4;
+/// Least share of a normal, squared, along which supports let a point move.
+const LEAST_SHARE: f32 = 1e-6;
 
 /// Where the corners of a triangle will be, and how far they move in the step, m; a node three times.
 pub(super) struct Candidate {
@@ -144,6 +146,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let Some(push) = memory.before.get_mut(place).filter(|push| axes(push.0) != Vec3::ZERO) else {
                 continue;
             };
+            // Next to a grip nothing else is pushed.
+            if contact.is_gripped(place) {
+                *push = NodeVector::ZERO;
+                continue;
+            }
             let Some(corners) = surface.corners(place).map(|corners| corners.map(after)) else { continue };
             let met = placed.iter().filter(|placed| !placed.is_plane());
             let nearest =
@@ -223,6 +230,13 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 continue;
             }
             found.scale = self.mass_at(&found, method);
+            if found.scale == 0.0 {
+                // Supports bear it.
+                for (node, share) in found.corners() {
+                    self.add_force(node, -share * Vec3::from_array(found.push), (step, method), totals);
+                }
+                found.push = [0.0; 3];
+            }
             self.add_touched(found);
         }
         for _ in 0..SWEEPS {
@@ -260,15 +274,18 @@ impl<M: ElementMaterial> Trial<'_, M> {
         self.solver_room().touched.get(at).copied()
     }
 
-    /// The mass (kg) that a push on a point of a triangle moves, as far as supports let it.
+    /// The mass (kg) that a push along the normal moves, as far as supports let it; zero where they do not.
     fn mass_at(&self, found: &TouchedPoint, method: &impl StepMethod<M>) -> f32 {
-        let inverse = |(node, share): (usize, f32)| {
-            let inertia = self.scene.inertia.get(node)?;
-            let moves = inertia.inverse.iter().any(|&inverse| inverse > 0.0);
-            moves.then_some(share * share / method.inertia_of(node, inertia).mass)
-        };
-        let inverse: f32 = found.corners().filter_map(inverse).sum();
-        if inverse > 0.0 { 1.0 / inverse } else { 0.0 }
+        let [x, y, z] = found.normal;
+        let (mut inverse, mut of_free) = (0.0, 0.0);
+        for (node, share) in found.corners() {
+            let Some(inertia) = self.scene.inertia.get(node) else { continue };
+            let inertia = method.inertia_of(node, inertia);
+            let [a, b, c] = inertia.inverse.map(|inverse| inverse.max(0.0));
+            inverse += share * share * (x * x * a + y * y * b + z * z * c);
+            of_free += share * share / inertia.mass;
+        }
+        if inverse > LEAST_SHARE * of_free { 1.0 / inverse } else { 0.0 }
     }
 
     /// How far a point moves in the step, m.

@@ -478,7 +478,7 @@ impl Run<'_> {
         if line.gradient() < 0.5 * least.0 {
             *least = (line.gradient(), *gradients);
         }
-        let swing = usual.max(line.quarter(4.0 * bounds.share));
+        let swing = usual.max(line.quarter(4.0 * bounds.share).min(MOST_LONGEST));
         let is_stuck = *gradients > least.1 + (*gradients / 2).max(16 * swing) || *gradients >= MOST_GRADIENTS * swing;
         if is_stuck {
             // Rounding may keep them there: a motion goes on if it does not say that the body is at rest.

@@ -166,6 +166,33 @@ fn tissue_between_balls_rests_and_stays() {
     }
 }
 
+/// What supports hold along the normal of an instrument they bear: no push grows from step to step, and nothing is glued aside.
+#[test]
+fn an_instrument_on_nodes_that_only_slide_feels_nothing() {
+    let bar = supple::mesh::Bar { size: [0.04, 0.04, 0.08], cells: [4, 4, 8] };
+    let tissue = VecMaterial::one(Element::Linear, NeoHookean { c: 3448.0, d: 33_333.0 }, 1000.0);
+    let points: Vec<[f32; 3]> = bar.points().collect();
+    let nodes = |at: f32| {
+        (0..points.len() as u32).filter(|&node| (points[node as usize][2] - at).abs() < 1e-6).collect::<Vec<_>>()
+    };
+    let fixed = nodes(0.0).into_iter().map(Support::fixed);
+    let slides = nodes(0.08).into_iter().map(|node| Support { axes: Axes::Z, ..Support::fixed(node) });
+    let supports: Vec<_> = fixed.chain(slides).collect();
+    let made = Simulation::new(points.clone(), bar.tets(), tissue, &supports);
+    let mut pressed = made.unwrap().meeting(true).unwrap();
+    pressed.set(Settings { damping: 20.0, ..Settings::default() });
+    pressed.gravity = [1.0, 0.0, 0.0];
+    let plane = Instrument::resting(Shape::Plane, Pose::along([0.0, 0.0, 0.0795], [0.0, 0.0, -1.0]));
+    pressed.instruments = vec![Instrument { friction: 0.5, ..plane }];
+    pressed.advance(1.0).unwrap();
+    let (force, top) = (pressed.touches()[0].force, pressed.displacements()[nodes(0.08)[12] as usize].to_array());
+    pressed.instruments.clear();
+    pressed.advance(1.0).unwrap();
+    let free = pressed.displacements()[nodes(0.08)[12] as usize].to_array();
+    println!("{force:?} N; the top slides by {:.4} mm, {:.4} without the plane", 1e3 * top[0], 1e3 * free[0]);
+    assert!(force.iter().all(|force| force.abs() < 1e-4) && free[0] > 1e-4 && (top[0] / free[0] - 1.0).abs() < 0.02);
+}
+
 #[test]
 fn a_free_body_that_falls_is_not_at_rest() {
     for element in ELEMENTS {
