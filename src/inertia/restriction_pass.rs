@@ -37,7 +37,15 @@ impl Kernel for RestrictionPass<'_> {
     type Output = f32;
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> f32 {
+    fn run<R: Real>(self) -> f32 {
+        // There are sums for two vectors of a tile.
+        if R::COUNT < 8 { self.run_in::<R::Width8>() } else { self.run_in::<R>() }
+    }
+}
+
+impl RestrictionPass<'_> {
+    #[inline(always)]
+    fn run_in<R: Real>(mut self) -> f32 {
         let input = self.input;
         let Range { start, end } = self.ranks;
         let whole = end - (end - start) % TILE;

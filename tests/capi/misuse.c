@@ -349,9 +349,9 @@ static void bytes_of_states(void) {
     REFUSED(SUPPLE_E_NULL, supple_restore(state, NULL, bytes));
     REFUSED(SUPPLE_E_MISMATCH, supple_restore(small_state, saved, bytes));
     REFUSED(SUPPLE_E_NOT_SAVED, supple_restore(state, points, sizeof points));
-    saved[8] = 9;
+    saved[8] ^= 64;
     REFUSED(SUPPLE_E_SAVED_VERSION, supple_restore(state, saved, bytes));
-    saved[8] = 3, saved[bytes - 1] ^= 1;
+    saved[8] ^= 64, saved[bytes - 1] ^= 1;
     REFUSED(SUPPLE_E_SAVED_CHECKSUM, supple_restore(state, saved, bytes));
 }
 
