@@ -1,5 +1,4 @@
-//! Checksums: of weights and fields CRC-32 (ISO-HDLC, as in zip and PNG), of scenes and saved states, which are made while a host
-//! waits, a faster one.
+//! Checksums: of what may lie in a file CRC-32 (ISO-HDLC, as in zip and PNG), of scenes a faster one.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
@@ -10,7 +9,14 @@ static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Of the bytes of a file.
 pub(crate) fn crc_32(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
+    crc_32_of([bytes])
+}
+
+/// Of those of parts that follow each other.
+pub(crate) fn crc_32_of<const N: usize>(parts: [&[u8]; N]) -> u32 {
+    let mut digest = CRC.digest();
+    parts.iter().for_each(|part| digest.update(part));
+    digest.finalize()
 }
 
 /// Of tables that follow each other: any change of one gives another number, but for one in 4e9.

@@ -5,7 +5,7 @@ use core::{ptr, slice};
 
 use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
-use crate::checksum::OfTables;
+use crate::checksum::crc_32_of;
 use crate::copy::copy;
 use crate::state::{MOVED_VECTORS, NodeVector, Progress};
 use crate::step::{EnergyBalance, EnergyCycle, Step};
@@ -17,9 +17,9 @@ use super::vectors::overlap;
 use supple_status::*;
 
 const MAGIC: [u8; 8] = *b"SUPPLE-M";
-const VERSION: u32 = 5;
+const VERSION: u32 = 3;
 /// Of tissue that relaxes.
-const VERSION_THAT_REMEMBERS: u32 = 6;
+const VERSION_THAT_REMEMBERS: u32 = 4;
 
 /// Before displacements, their remainders and increments, four floats each.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -27,7 +27,7 @@ const VERSION_THAT_REMEMBERS: u32 = 6;
 struct Front {
     magic: [u8; 8],
     version: u32,
-    /// Of all that follows ([`OfTables`]).
+    /// CRC-32 of all that follows.
     checksum: u32,
     nodes: u32,
     /// That the increments span, s.
@@ -230,8 +230,5 @@ fn check_finite(front: &Front, rest: &[u8], past: &Remembered, remembered: &[u8]
 }
 
 fn checksum(front: &Front, rest: &[u8]) -> u32 {
-    let mut sum = OfTables::new();
-    sum.update(bytes_of(front).get(CHECKED..).unwrap_or_default());
-    sum.update(rest);
-    sum.number()
+    crc_32_of([bytes_of(front).get(CHECKED..).unwrap_or_default(), rest])
 }
