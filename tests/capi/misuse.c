@@ -1165,7 +1165,8 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_MISMATCH, supple_read_pulls(made, small_state, read, 2));
     DONE(supple_read_pulls(made, state, read, 2));
     CHECK(read[0].gap[0] < 0.002f && read[0].point[0] > pull.at[0] && read[0].force[0] > 0.0f);
-    CHECK(fabsf(read[0].force[0] - pull.stiffness * read[0].gap[0]) < 1e-3f * read[0].force[0]);
+    /* The force is that within the step, the gap that at its end. */
+    CHECK(fabsf(read[0].force[0] - pull.stiffness * read[0].gap[0]) < 1e-2f * read[0].force[0]);
     CHECK(read[1].force[0] == 0.0f && read[1].gap[0] == 0.0f);
 
     /* A step that is refused leaves no force. */
