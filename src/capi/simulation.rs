@@ -302,7 +302,8 @@ pub unsafe extern "C" fn supple_sim_setup(
     unsafe { memory::answered(setup(), error) }
 }
 
-/// Other steps from now on, in the same memory; the motion goes on as it is. To be called as well where lengths are
+/// Other steps from now on, in the same memory; the motion goes on as it is. After long steps their forces are computed once
+/// more, under the loads and instruments as they are, which pulls and contact then tell. To be called as well where lengths are
 /// chosen, so that they fit a state that was reset, restored, or moved by other functions. What there is room for stays
 /// as it was at supple_sim_setup. Where the scene itself refuses the steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there
 /// are none until the next call.

@@ -969,6 +969,8 @@ static supple_status use_sim(void) {
     supple_sim *sim = object(SIM, 1);
     supple_sim_objects objects;
     if (one_in(20) || supple_sim_describe(sim, &objects) != SUPPLE_OK) return supple_sim_describe(sim, one_in(2) ? NULL : &objects);
+    /* Long steps that end compute their forces once more. */
+    contacts_may_change();
     if (one_in(6)) {
         const supple_settings settings = some_settings();
         return supple_sim_set(sim, one_in(60) ? NULL : &settings, wanted());
@@ -977,7 +979,6 @@ static supple_status use_sim(void) {
         const float gravity[3] = {wild(10.0f), wild(10.0f), wild(10.0f)};
         return supple_set_gravity(objects.loads, gravity);
     }
-    contacts_may_change();
     if (one_in(12)) return supple_state_reset(objects.state);
     if (one_in(8)) {
         return one_in(2) ? supple_set_pulls(objects.loads, one_in(4) ? NULL : object(PULLS, 1))
