@@ -26,7 +26,7 @@ use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{Moment, StateView};
-use crate::step::{CallingThread, Status, Step, Threads, Work};
+use crate::step::{CallingThread, Status, Step, Threads, Work, extreme_lengths};
 use crate::tled::{self, Approach, Pace, vectors_for_pace};
 use control::Control;
 
@@ -268,17 +268,6 @@ pub struct Taken {
     pub seconds: [f32; 2],
 }
 
-impl Taken {
-    fn enter_length(&mut self, length: f32) {
-        self.seconds = merged(self.seconds, [length; 2]);
-    }
-}
-
-/// The extremes of both; zeros are none.
-fn merged([shortest, longest]: [f32; 2], [more, other]: [f32; 2]) -> [f32; 2] {
-    [if shortest > 0.0 && (more == 0.0 || shortest < more) { shortest } else { more }, longest.max(other)]
-}
-
 impl Add for Taken {
     type Output = Self;
 
@@ -287,7 +276,7 @@ impl Add for Taken {
             exact: self.exact.saturating_add(more.exact),
             large: self.large.saturating_add(more.large),
             changes: self.changes.saturating_add(more.changes),
-            seconds: merged(self.seconds, more.seconds),
+            seconds: extreme_lengths(self.seconds, more.seconds),
         }
     }
 }
@@ -397,7 +386,7 @@ impl AdaptiveView<'_> {
             }
             taken.exact += 1;
             let seconds = state.last_step();
-            taken.enter_length(seconds);
+            taken.seconds = extreme_lengths(taken.seconds, [seconds; 2]);
             control.wait(seconds);
             control.enter_kinetic(state.energy_balance.kinetic, seconds);
             control.enter_way(loads.way(state.time() - f64::from(seconds), seconds), seconds);
@@ -488,7 +477,7 @@ impl AdaptiveView<'_> {
                 return Ok(worst);
             }
             taken.large += 1;
-            taken.enter_length(seconds);
+            taken.seconds = extreme_lengths(taken.seconds, [seconds; 2]);
             control.wait(seconds);
             worst = worst.worse(judged(status, estimate[0], self.chooser.request.tolerance));
             if self.watch.comparisons() > before && control.decide(estimate) {

@@ -45,16 +45,11 @@ impl AddedMotion<'_> {
 impl Kernel for AddedMotion<'_> {
     type Output = Totals;
 
-    #[inline(always)]
-    fn run<R: Real>(self) -> Totals {
-        // There are sums for two vectors of a tile.
-        if R::COUNT < 8 { self.run_in::<R::Width8>() } else { self.run_in::<R>() }
-    }
-}
+    // There are sums for two vectors of a tile.
+    const EIGHT: bool = true;
 
-impl AddedMotion<'_> {
     #[inline(always)]
-    fn run_in<R: Real>(mut self) -> Totals {
+    fn run<R: Real>(mut self) -> Totals {
         let (input, cells) = (self.input, self.cells);
         let Range { start, end } = self.ranks;
         let whole = end - (end - start) % TILE;

@@ -144,16 +144,11 @@ impl MotionPass<'_> {
 impl Kernel for MotionPass<'_> {
     type Output = PassTotals;
 
-    #[inline(always)]
-    fn run<R: Real>(self) -> PassTotals {
-        // There are sums for two vectors of a tile.
-        if R::COUNT < 8 { self.run_in::<R::Width8>() } else { self.run_in::<R>() }
-    }
-}
+    // There are sums for two vectors of a tile.
+    const EIGHT: bool = true;
 
-impl MotionPass<'_> {
     #[inline(always)]
-    fn run_in<R: Real>(mut self) -> PassTotals {
+    fn run<R: Real>(mut self) -> PassTotals {
         let (input, lattice) = (self.input, self.lattice);
         let Range { start, end } = self.ranks;
         let whole = end - (end - start) % TILE;

@@ -46,9 +46,13 @@ impl ResidualFactors {
         let stable = (2.0 - removed.max(rough_motion::MOST)) / (2.0 - rough_motion::MOST);
         let ratio = stable * (1.0 + model.scaling.k) / (1.0 + k);
         let due = 0.5 * (1.0 + 1.0 / step.carry()) + model.owed / step.seconds();
-        let span = if progress.steps == 0 { 0.5 } else { due.min(LONGEST_SPAN) };
+        let (span, owed) = if progress.steps == 0 {
+            (0.5, 0.0)
+        } else {
+            let span = due.min(LONGEST_SPAN);
+            (span, step.seconds() * (due - span))
+        };
         let square = step.seconds() * step.seconds() * span;
-        let owed = if progress.steps == 0 { 0.0 } else { step.seconds() * (due - span) };
         Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry(), owed }
     }
 

@@ -36,16 +36,11 @@ fn largest<R: Real>(before: R, nodes: &NodeValues<R>) -> R {
 impl Kernel for RestrictionPass<'_> {
     type Output = f32;
 
-    #[inline(always)]
-    fn run<R: Real>(self) -> f32 {
-        // There are sums for two vectors of a tile.
-        if R::COUNT < 8 { self.run_in::<R::Width8>() } else { self.run_in::<R>() }
-    }
-}
+    // There are sums for two vectors of a tile.
+    const EIGHT: bool = true;
 
-impl RestrictionPass<'_> {
     #[inline(always)]
-    fn run_in<R: Real>(mut self) -> f32 {
+    fn run<R: Real>(mut self) -> f32 {
         let input = self.input;
         let Range { start, end } = self.ranks;
         let whole = end - (end - start) % TILE;

@@ -39,6 +39,8 @@ pub trait Kernel {
     /// Whether scalar code gives the same bits as vectors. Processors without vector instructions then run scalar code.
     #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
     const SCALAR: bool = false;
+    /// Whether vectors must have eight values or more.
+    const EIGHT: bool = false;
     /// The work, with vectors of this kind.
     fn run<R: Real>(self) -> Self::Output;
     /// The same as scalar code. Kernels whose batches differ in size then say so here: vectors are not compiled with
@@ -176,7 +178,7 @@ pub(super) fn at_current_level<K: Kernel>(kernel: K) -> K::Output {
 #[cfg_attr(target_arch = "x86_64", inline(never))]
 #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
 fn with_baseline<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Baseline>()
+    if K::EIGHT { kernel.run::<<Baseline as Real>::Width8>() } else { kernel.run::<Baseline>() }
 }
 
 #[cfg(target_arch = "x86_64")]

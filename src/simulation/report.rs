@@ -1,7 +1,7 @@
 //! What a call of `advance` came to.
 
 use crate::guard::Estimate;
-use crate::step::Status;
+use crate::step::{Status, extreme_lengths};
 
 /// What a call of `advance` came to.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,6 @@ impl Report {
     }
 
     pub(super) fn enter_length(&mut self, seconds: f32) {
-        let [shortest, longest] = self.seconds;
-        self.seconds = [if shortest > 0.0 { shortest.min(seconds) } else { seconds }, longest.max(seconds)];
+        self.seconds = extreme_lengths(self.seconds, [seconds; 2]);
     }
 }

@@ -83,6 +83,12 @@ pub(crate) fn equal_steps(span: f64, longest: f32) -> (u32, f32) {
     (count as u32, if is_longest { longest } else { (length as f32).min(longest) })
 }
 
+/// The shortest and the longest step (s) of two sets of steps; zeros are those of none.
+pub(crate) fn extreme_lengths([shortest, longest]: [f32; 2], [shorter, longer]: [f32; 2]) -> [f32; 2] {
+    let is_less = shortest > 0.0 && (shorter == 0.0 || shortest < shorter);
+    [if is_less { shortest } else { shorter }, longest.max(longer)]
+}
+
 /// Whether this can be a damping, 1/s.
 pub(crate) const fn is_damping(damping: f32) -> bool {
     damping.is_finite() && damping >= 0.0

@@ -25,7 +25,7 @@ pub(crate) use cause::MOST_OF_SIZE;
 pub(crate) use compensated::moved;
 pub(crate) use energy_sums::{Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
-pub(crate) use length::{ROUNDING, equal_steps, is_damping};
+pub(crate) use length::{ROUNDING, equal_steps, extreme_lengths, is_damping};
 pub(crate) use parts::{Moving, TotalForces, internal_forces, move_in_parts, nodal_volumes, write_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
