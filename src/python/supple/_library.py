@@ -122,9 +122,10 @@ def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.floa
     if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
         wanted = "(n, 3)" if count is None else f"({count}, 3)"
         raise errors.InputError(f"{what}: its shape is {array.shape}, it must be {wanted}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(bad):
-        raise errors.InputError(f"{what}: row {bad[0]} is {array[bad[0]].tolist()}, not finite")
+    finite = np.isfinite(array)
+    if not finite.all():
+        bad = np.argmin(finite.all(axis=1))
+        raise errors.InputError(f"{what}: row {bad} is {array[bad].tolist()}, not finite")
     return np.ascontiguousarray(array, np.float32)
 
 
@@ -146,9 +147,9 @@ def node_numbers(selection: Any, nodes: int, what: str, kind: str = "node") -> N
             f"{what}: as many {array.dtype} zeros and ones as there are {kind}s are taken neither as numbers nor as a mask: "
             "for a mask give mask.astype(bool) or numpy.flatnonzero(mask)"
         )
-    bad = np.flatnonzero((array < 0) | (array >= nodes))
-    if len(bad):
-        raise errors.InputError(f"{what}: entry {bad[0]} is {kind} {array[bad[0]]}, there are {nodes} {kind}s")
+    if array.min() < 0 or array.max() >= nodes:
+        bad = np.argmax((array < 0) | (array >= nodes))
+        raise errors.InputError(f"{what}: entry {bad} is {kind} {array[bad]}, there are {nodes} {kind}s")
     return array.astype(np.uint32)
 
 

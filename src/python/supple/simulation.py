@@ -280,7 +280,7 @@ class Simulation:
         self._traction = corners, np.array(pascal, np.float32), ramp
 
     def _set_forces(self, forces: NDArray[np.void], tractions: NDArray[np.void]) -> None:
-        error, rows = library.new_error(), np.concatenate([forces, tractions])
+        error, rows = library.new_error(), np.concatenate([forces, tractions]) if len(tractions) else forces
         library.checked(lib.supple_set_forces(self._loads, library.pointer("supple_force", rows), len(rows), error), error, "forces")
         self._forces, self._tractions = forces, tractions
 
