@@ -134,7 +134,7 @@ impl Pull {
     }
 
     /// Whether it acts.
-    const fn acts(&self) -> bool {
+    pub(crate) const fn acts(&self) -> bool {
         self.stiffness > 0.0 && !self.to[0].is_nan()
     }
 

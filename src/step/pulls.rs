@@ -9,6 +9,9 @@ use crate::simd::NodeVector;
 
 /// The most that a pull moves its point in an exact step, as a share of the size of a node's tissue.
 pub(crate) const MOST_WAY: f32 = 0.02;
+/// Tissue that moves as a whole may gather speed beyond that: by how much more than by itself, and than its force in the step before
+/// would, a pull may move its point, as shares of that.
+const MOST_GAIN: [f32; 2] = [0.15, 0.01];
 /// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below
 /// which they are not again.
 const SWEEPS: usize = 3;
@@ -32,12 +35,15 @@ impl<M: ElementMaterial> Trial<'_, M> {
     pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> f32 {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let start = self.progress.time;
-        self.pulls.fill(NodeVector::ZERO);
         let mut sweep = 0;
+        for (force, _) in self.pulls.iter_mut().zip(pulls.pulls()).filter(|(_, pull)| !pull.acts()) {
+            *force = NodeVector::ZERO;
+        }
         loop {
             let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
             for (index, pull) in pulls.acting() {
-                let now = at(self.pulls, index);
+                // At first those of the step before.
+                let (kept, now) = (at(self.pulls, index), if sweep == 0 { Vec3::ZERO } else { at(self.pulls, index) });
                 let point = self.pulled_point(pulls, pull, (step, method));
                 let [late, next, last] = point.shares(pull.stiffness);
                 let time = start + f64::from(late * step.seconds());
@@ -45,10 +51,10 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 let change = pull.force(gap, now, next * point.compliance) - now;
                 let first = pulls.nodes_of(pull).first();
                 let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
-                let change = point.without_tearing(change, most_way * most_way * most_way * volume);
+                let change = point.without_tearing(change, kept - now, most_way * most_way * most_way * volume);
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);
-                if sweep < SWEEPS && change != Vec3::ZERO {
+                if sweep < SWEEPS && (sweep == 0 || change != Vec3::ZERO) {
                     self.add_pull(pulls, pull, (index, now + change), change);
                 }
             }
@@ -124,15 +130,18 @@ impl Point {
     }
 
     /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, the edge of
-    /// this volume (m^3), or no farther than it moves by itself.
-    fn without_tearing(&self, change: Vec3, volume: f32) -> Vec3 {
+    /// this volume (m^3), or little farther than it moves by itself and than the `kept` change (N) would.
+    fn without_tearing(&self, change: Vec3, kept: Vec3, volume: f32) -> Vec3 {
         let (free, way) = (self.next, self.compliance * change);
         let square = (free + way).length_squared();
         // Without a root where there is nothing to be done, as this is for every pull in every step.
         if square * square * square <= volume * volume || square <= free.length_squared() {
             return change;
         }
-        let most = libm::cbrtf(volume).max(free.length());
+        let edge = libm::cbrtf(volume);
+        let (own, before) = (free.length(), (free + self.compliance * kept).length());
+        let [of_own, of_before] = MOST_GAIN.map(|share| share * edge);
+        let most = edge.max(own.max(f32::min(own + of_own, before + of_before)));
         // |free + share way| = most
         let (product, length) = (free.dot(way), way.length_squared());
         let rest = product * product + length * (most * most - free.length_squared()).max(0.0);

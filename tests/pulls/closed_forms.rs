@@ -250,3 +250,29 @@ fn the_usual_limit_is_that_of_the_tissue_at_the_pull() {
             && (reversed / above - 1.0).abs() < 1e-5
     );
 }
+
+/// Springs in proportion to the masses of the nodes let a body swing as one, however fast: it strains no element.
+#[test]
+fn springs_swing_a_fast_body_as_one() {
+    for element in ELEMENTS {
+        for (fastest, rate) in [(0.1, 25.0), (0.6, 25.0), (0.2, 60.0)] {
+            let mut body = bar(element, false).with(settings(Method::Exact, 0.0, None));
+            let amplitude: f32 = fastest / rate;
+            for node in 0..body.points().len() {
+                let mass = body.scene().view().node_mass(node);
+                let spring = body.pull(body.points()[node], 1e-6, rate * rate * mass).unwrap();
+                body.pulls[spring].most = f32::INFINITY;
+            }
+            body.set_displacements(&vec![[amplitude, 0.0, 0.0]; body.points().len()]).unwrap();
+            let mut off = 0.0f32;
+            for _ in 0..20 {
+                body.advance(1.0 / 60.0).unwrap();
+                let expected = amplitude * (rate * body.state().time() as f32).cos();
+                let far = body.displacements().iter().map(|u| (u.to_array()[0] - expected).abs()).fold(0.0, f32::max);
+                off = off.max(far / amplitude);
+            }
+            println!("{element:?}, up to {fastest} m/s, {rate} 1/s: {:.2} % off", 100.0 * off);
+            assert!(off < 0.06);
+        }
+    }
+}

@@ -76,8 +76,8 @@ def test_targets_move_and_pulls_end(soft):
         first.move([[0.01, 0.01 + 1e-4 * frame, 0.0], [0.01, 0.01 + 1e-4 * frame, 0.06]], within=1 / 60)
         simulation.advance(1 / 60)
     assert first.points[:, 1] == pytest.approx([0.0129] * 2, abs=5e-4)
-    # Only along its direction.
-    assert side.gaps[0, 0] == 0.0 and side.points[0, 0] == pytest.approx(0.01, abs=5e-4)
+    # Only along its direction; the push against its side turns the bar a little.
+    assert side.gaps[0, 0] == 0.0 and side.points[0, 0] == pytest.approx(0.01, abs=1e-3)
     side.release()
     with pytest.raises(supple.InputError, match="were released"):
         side.points
