@@ -104,6 +104,11 @@ pub enum LoadError {
         /// The stiffness, Pa, which must be zero or more.
         bulk: f32,
     },
+    /// A surface that is to be filled is open.
+    Open {
+        /// Position in the list of surfaces.
+        index: usize,
+    },
     /// A triangle is of a surface that has no pressure.
     Surface {
         /// Position in the list of triangles.
@@ -140,6 +145,10 @@ impl fmt::Display for LoadError {
                 f,
                 "pressure {index}: filling to {volume} m^3 with {bulk} Pa; the volume must be positive, the stiffness zero or more"
             ),
+            Self::Open { index } => write!(
+                f,
+                "pressure {index}: its surface is open, so it has no volume to be filled to: add the triangles that close it, or set a pressure"
+            ),
             Self::Surface { index, surface, surfaces } => {
                 write!(f, "pressure triangle {index}: surface {surface} does not exist, there are {surfaces}")
             }
@@ -166,6 +175,13 @@ pub struct Loads<'a> {
     pulls: Option<Pulls<'a>>,
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
+}
+
+/// What loads were in a step: gravity, m/s^2, and a sum that other forces, pressures and pulls change.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LoadMark {
+    pub(crate) gravity: [f32; 3],
+    pub(crate) others: f64,
 }
 
 /// Loads of each step of a span of time, for prescribed motions that go on within it.
@@ -334,6 +350,25 @@ impl<'a> Loads<'a> {
 
     pub(crate) const fn nodes(&self) -> Option<usize> {
         self.nodes
+    }
+
+    /// To see whether a host has changed them since.
+    pub(crate) fn mark(&self) -> LoadMark {
+        let [x, y, z] = [1.0, core::f64::consts::SQRT_2, core::f64::consts::E];
+        let of_force = |force: &NodalForce| {
+            let [a, b, c] = force.newton.map(f64::from);
+            (f64::from(force.node) + z) * (x * a + y * b + z * c)
+        };
+        let forces: f64 = self.forces.iter().map(of_force).sum();
+        let pulls = self.pulls().into_iter().flat_map(Pulls::acting);
+        let pulls: f64 = pulls.map(|(index, pull)| (index as f64 + z) * f64::from(pull.stiffness)).sum();
+        let pressures = self.pressure.map_or(0.0, |pressure| pressure.mark());
+        LoadMark { gravity: self.gravity, others: forces + y * pulls + pressures }
+    }
+
+    /// The same loads with another gravity, m/s^2.
+    pub(crate) const fn with_gravity(self, gravity: [f32; 3]) -> Self {
+        Self { gravity, ..self }
     }
 
     /// Gravity, m/s^2.

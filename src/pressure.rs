@@ -131,6 +131,29 @@ impl SurfacePressure {
         }
         Ok(())
     }
+
+    /// The same, and that surface `index` of these triangles is closed if it is to be filled: each edge is there in both directions
+    /// as often. Of an open one the edges do not cancel, but by a chance of 1 in 2^64.
+    pub(crate) fn check_on(&self, index: usize, triangles: &[PressedTriangle]) -> Result<(), LoadError> {
+        self.check(index)?;
+        if self.bulk > 0.0 {
+            let own = triangles.iter().filter(|triangle| triangle.surface as usize == index);
+            let edges = own.map(|&PressedTriangle { nodes: [a, b, c], .. }| [edge(a, b), edge(b, c), edge(c, a)]);
+            if edges.flatten().fold(0, u64::wrapping_add) != 0 {
+                return Err(LoadError::Open { index });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The same number for an edge from `a` to `b` as the negative of that from `b` to `a` (SplitMix64, Steele et al. 2014).
+fn edge(a: u32, b: u32) -> u64 {
+    let mut mixed = (u64::from(a.min(b)) << 32 | u64::from(a.max(b))).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^= mixed >> 31;
+    if a < b { mixed } else { mixed.wrapping_neg() }
 }
 
 /// Pressures on surfaces, checked, borrowed from the caller.
@@ -159,7 +182,7 @@ impl<'a> Pressure<'a> {
             }
         }
         for (index, surface) in surfaces.iter().enumerate() {
-            surface.check(index)?;
+            surface.check_on(index, triangles)?;
         }
         Ok(Self { triangles, surfaces })
     }
@@ -169,6 +192,15 @@ impl<'a> Pressure<'a> {
     #[must_use]
     pub const fn unchecked(triangles: &'a [PressedTriangle], surfaces: &'a [SurfacePressure]) -> Self {
         Self { triangles, surfaces }
+    }
+
+    /// See [`crate::loads::Loads::mark`].
+    pub(crate) fn mark(&self) -> f64 {
+        let of_surface = |(index, surface): (usize, &SurfacePressure)| {
+            let [pascal, volume, bulk] = [surface.pascal, surface.volume, surface.bulk].map(f64::from);
+            (index as f64 + core::f64::consts::E) * (pascal + volume * bulk + core::f64::consts::SQRT_2 * bulk)
+        };
+        self.surfaces.iter().enumerate().map(of_surface).sum()
     }
 
     /// The volume (m^3) within a closed surface at these displacements (m), of a body or of a cavity.
@@ -306,10 +338,10 @@ impl VecPressure {
         pressure: SurfacePressure,
     ) -> Result<usize, LoadError> {
         let surface = self.surfaces.len();
-        pressure.check(surface)?;
         let made = triangles.iter().enumerate();
         let made = made.map(|(index, &nodes)| PressedTriangle::new(points, index, nodes, surface as u32));
         let made: std::vec::Vec<_> = made.collect::<Result<_, _>>()?;
+        pressure.check_on(surface, &made)?;
         self.triangles.extend(made);
         self.surfaces.push(pressure);
         Ok(surface)

@@ -6,7 +6,7 @@ use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::{DMat3, DVec3};
 
 use crate::element::{ElementMaterial, ElementTile, ScalarBound};
-use crate::loads::Loads;
+use crate::loads::{LoadMark, Loads};
 use crate::material::Element;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -37,6 +37,8 @@ pub struct LargeModel {
     scene: u32,
     /// The state after the latest step, or at the preparation: inertia belongs to it.
     pub(super) moment: Moment,
+    /// Loads in the latest step.
+    pub(super) loads: LoadMark,
     pub(super) method: Method,
     /// Rough motion in the latest damped step.
     pub(super) rough: RoughMotion,
@@ -188,6 +190,7 @@ impl LargeModel {
             element: scene.element(),
             scene: scene.checksum(),
             moment: Progress::START.moment(),
+            loads: LoadMark::default(),
             method,
             rough: RoughMotion::NONE,
             step,

@@ -6,7 +6,8 @@
 //! ```text
 //! du' = r (du + du+) / 2 - r^2 (du+ - du) / 2
 //! ```
-//! and, where forces have yet to act for a time (`owed` of the model), with that acceleration for it.
+//! and, where forces have yet to act for a time (`owed` of the model), with that acceleration for it. Where a host has changed
+//! gravity since, it is that of the long step; where it has changed other loads, velocities stay those of the middle of the step.
 
 use super::large_step::LargeView;
 use super::lattice::rank_of;
@@ -26,7 +27,7 @@ impl LargeView<'_> {
         seconds: f32,
         scene: SceneView<'_, M>,
         loads: &Loads<'_>,
-        state: StateView<'_>,
+        mut state: StateView<'_>,
         threads: &impl Threads,
     ) -> Status {
         let (model, storage) = match self.opened(scene, &state) {
@@ -40,6 +41,13 @@ impl LargeView<'_> {
         if !(share > 0.0 && share < 1.0) {
             return Status::Ok;
         }
+        let (mark, is_own) = (loads.mark(), model.has_stepped && model.moment == state.progress.moment());
+        if is_own && mark.others != model.loads.others {
+            state.respan(seconds);
+            return Status::Ok;
+        }
+        // What a host has changed since has acted for no time yet.
+        let loads = &loads.with_gravity(if is_own { model.loads.gravity } else { mark.gravity });
         let mut trial = match Trial::begin(scene, loads, state, nodes) {
             Ok(trial) => trial,
             Err(refused) => return refused,

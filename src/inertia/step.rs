@@ -168,8 +168,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
         let Self { model, storage, held_back, coarse_share, .. } = self;
-        let LargeModel { lattice, renewal, report, nodes, moment, owed, calms, has_stepped, .. } = &mut **model;
-        (*moment, *owed) = (trial.progress.moment(), self.owed);
+        let LargeModel { lattice, renewal, report, nodes, moment, loads, owed, calms, has_stepped, .. } = &mut **model;
+        (*moment, *loads, *owed) = (trial.progress.moment(), trial.loads.mark(), self.owed);
         (*calms, *has_stepped) = (false, true);
         renewal.enter(storage.room.part, lattice, &storage.matrices.frames);
         *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
