@@ -323,6 +323,12 @@
 #define SUPPLE_REMARK_HELD_PULL 13
 
 /**
+ * Instrument `index` starts within the body, where it touches nothing and pushes the surface from within: let its path
+ * begin outside.
+ */
+#define SUPPLE_REMARK_INSIDE 14
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
  * afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large
@@ -635,6 +641,10 @@ enum supple_status
      * around it (limit: its size, m).
      */
     SUPPLE_E_DIVERGED_PRESSURE = -98,
+    /**
+     * Surface `index` is to be filled, but is open: it has no volume.
+     */
+    SUPPLE_E_OPEN_SURFACE = -99,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -2041,7 +2051,8 @@ supple_status supple_pressure_set(supple_pressure *pressure,
 /**
  * Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
  * within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
- * the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps.
+ * the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps. A surface that
+ * is open is refused (SUPPLE_E_OPEN_SURFACE).
  *
  * @param cubic_metres m^3, above zero.
  * @param bulk Pa; 0: the volume is not asked for.
@@ -2846,7 +2857,7 @@ size_t supple_settle_size(uint32_t nodes);
  *
  * SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
  * tells how much is missing, and another call goes on from there. Where a step is refused the status says why, and the
- * state is that before it.
+ * body stands where the steps before have brought it.
  *
  * @param metre m, above zero.
  * @param most_steps at least one is taken; each takes about as long as an exact one.

@@ -142,6 +142,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_no_pulls = SUPPLE_E_NO_PULLS,
     e_no_relaxation = SUPPLE_E_NO_RELAXATION,
     e_diverged_pressure = SUPPLE_E_DIVERGED_PRESSURE,
+    e_open_surface = SUPPLE_E_OPEN_SURFACE,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -268,7 +269,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
     case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): case of(s::e_diverged_pressure):
     case of(s::e_relaxation_share): case of(s::e_relaxation_time): case of(s::e_no_relaxation):
-    case of(s::e_fibres): case of(s::e_direction): return true;
+    case of(s::e_fibres): case of(s::e_direction): case of(s::e_open_surface): return true;
     }
     return false;
 }
@@ -313,6 +314,7 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_diverged_energy: return {"entry", " J", true, true};
     case status::e_diverged_force: return {"force", "", true, true};
     case status::e_diverged_pressure: return {"surface", "", true, true};
+    case status::e_open_surface: return {"surface", "", false, false};
     case status::e_diverged_motion: return {"entry", " m", true, true};
     case status::e_diverged_instrument: return {"instrument", " m", true, true};
     case status::e_instrument: return {"instrument", "", true, false};

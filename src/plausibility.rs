@@ -2,7 +2,8 @@
 //! same, but remarked upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa),
 //! Poisson's ratio, gravity (m/s^2), forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`,
 //! the speed of shear waves at rest in the softest tissue), supports counted from one, a network that learned
-//! another tissue, instruments that pass between the nodes that they can touch, and pulls of held nodes.
+//! another tissue, instruments that pass between the nodes that they can touch or start within the body, and pulls of
+//! held nodes.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -32,6 +33,8 @@ const POISSON_RATIOS: RangeInclusive<f64> = 0.0..=0.499_99;
 const MOST_GRAVITY: f64 = 1e3;
 /// Share of the diagonal by which a node may jump in the first step.
 const MOST_JUMP: f64 = 0.05;
+/// Share of a tetrahedron by which a point on its face may be outside.
+const ROUNDED: f64 = 1e-6;
 /// Faces of elements with three held nodes that a support has at least, to be told from single nodes.
 const FACES_OF_A_SUPPORT: u32 = 4;
 
@@ -82,6 +85,8 @@ pub enum Remark {
     OtherTissue,
     /// An instrument of this thickness, m, that can touch nodes only, where the surface has longer edges.
     Thin(f32),
+    /// An instrument whose middle or axis starts within the body at rest: it pushes its surface from within, or not at all.
+    Inside,
     /// A pull all of whose nodes are held where it would move them.
     HeldPull,
 }
@@ -135,6 +140,9 @@ impl fmt::Display for Remark {
                 f,
                 "an instrument is {:.2} mm thick, and edges of the surface are longer: it needs the surface's triangles",
                 1e3 * thickness
+            ),
+            Self::Inside => f.write_str(
+                "an instrument starts within the body, where it touches nothing and pushes the surface from within; let its path begin outside",
             ),
             Self::HeldPull => f.write_str("all nodes of a pull are held: it moves nothing"),
         }
@@ -281,20 +289,30 @@ pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'
     (!(is_same_law && tissues_of(scene.material).all(is_same))).then_some(Remark::OtherTissue)
 }
 
-/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, of a
-/// scene that was built from these points, m.
+/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, or starts within
+/// the body, of a scene that was built from these points, m.
 pub fn of_contact<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
     contact: &Contact<'_>,
     mut say: impl FnMut(usize, Remark),
 ) {
+    let nodes = |(tile, lane): (&ElementTile, usize)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane) as u32);
+    for (index, instrument) in contact.instruments().iter().enumerate() {
+        // Of a shape whose middle is outside itself, as of a plane, nothing is known.
+        let within =
+            instrument.axis().into_iter().filter(|&point| instrument.distance(point, instrument.times[0]) < 0.0);
+        let is_within =
+            |point| scene.places().any(|place| is_in(point, nodes(place).map(|node| points.get(node as usize))));
+        if instrument.shape.thickness().is_finite() && within.into_iter().any(is_within) {
+            say(index, Remark::Inside);
+        }
+    }
     if !contact.surface().triangles().is_empty() {
         return;
     }
     // Behind a face that is held elements may have been left out.
     let is_held = |face: &[u32; 3]| face.iter().all(|&node| scene.held(node as usize) == Axes::XYZ);
-    let nodes = |(tile, lane): (&ElementTile, usize)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane) as u32);
     for (index, instrument) in contact.instruments().iter().enumerate() {
         let thickness = instrument.shape.thickness();
         let faces = scene.places().flat_map(|place| faces(nodes(place))).filter(|face| !is_held(face));
@@ -302,6 +320,17 @@ pub fn of_contact<M: ElementMaterial>(
             say(index, Remark::Thin(thickness));
         }
     }
+}
+
+/// Whether a point is in a tetrahedron of positive volume, or on it.
+fn is_in(point: [f32; 3], corners: [Option<&[f32; 3]>; 4]) -> bool {
+    let [Some(a), Some(b), Some(c), Some(d)] = corners else { return false };
+    let [a, b, c, d] =
+        [a, b, c, d].map(|corner| DVec3::from(corner.map(f64::from)) - DVec3::from(point.map(f64::from)));
+    let volume = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
+    let parts = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
+    let all: f64 = parts.iter().sum();
+    parts.iter().all(|&part| part >= -ROUNDED * all)
 }
 
 /// Of a pull along a direction (zeros: along all) on nodes with these held axes.

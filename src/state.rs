@@ -508,6 +508,8 @@ pub struct VecVectors {
     touches: std::vec::Vec<Touch>,
     pulls: std::vec::Vec<NodeVector>,
     memory: std::vec::Vec<NodeVector>,
+    /// Checksum of the tables that the memory belongs to.
+    tables: u32,
 }
 
 #[cfg(any(feature = "std", test))]
@@ -517,7 +519,7 @@ impl StateVectors for VecVectors {
     }
 
     fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>) {
-        let Self { vectors, pushes, touches, pulls, memory } = self;
+        let Self { vectors, pushes, touches, pulls, memory, .. } = self;
         (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches, pulls, memory })
     }
 }
@@ -534,21 +536,29 @@ impl VecState {
         let zero = || std::vec![NodeVector::ZERO; nodes];
         let vectors = [zero(), zero(), zero(), zero(), zero()];
         let (pushes, touches, pulls, memory) = (std::vec![], std::vec![], std::vec![], std::vec![]);
-        Self { vectors: VecVectors { vectors, pushes, touches, pulls, memory }, progress: Progress::START }
+        Self { vectors: VecVectors { vectors, pushes, touches, pulls, memory, tables: 0 }, progress: Progress::START }
     }
 
     /// The same with room for what a scene's tissue remembers ([`StateView::remembering`]).
     #[must_use]
     pub fn of<M: Material>(scene: SceneView<'_, M>) -> Self {
         let mut state = Self::at_rest(scene.node_count());
-        state.vectors.memory = std::vec![NodeVector::ZERO; scene.memory_vectors()];
+        state.remember(std::vec![NodeVector::ZERO; scene.memory_vectors()], scene.memory_checksum());
         state
     }
 
-    /// Takes over what tissue remembers, in two copies of which the first is that of now.
+    /// Takes over what tissue remembers, in two copies of which the first is that of now, and the checksum of the scene's tables
+    /// ([`SceneView::memory_checksum`]).
+    pub(crate) fn remember(&mut self, memory: std::vec::Vec<NodeVector>, tables: u32) {
+        (self.vectors.memory, self.vectors.tables, self.progress.second) = (memory, tables, false);
+    }
+
+    /// Remembers nothing where it was moved in another scene, with other tables, whose tissue it remembers.
     #[cfg(feature = "std")]
-    pub(crate) fn remember(&mut self, memory: std::vec::Vec<NodeVector>) {
-        (self.vectors.memory, self.progress.second) = (memory, false);
+    pub(crate) fn forget_other(&mut self, vectors: usize, tables: u32) {
+        if vectors > 0 && (self.vectors.tables != tables || self.vectors.memory.len() != vectors) {
+            self.remember(std::vec![NodeVector::ZERO; vectors], tables);
+        }
     }
 
     /// The same with room for what instruments do on a surface.

@@ -118,7 +118,8 @@ pub unsafe extern "C" fn supple_pressure_set(
 
 /// Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
 /// within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
-/// the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps.
+/// the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps. A surface that
+/// is open is refused (SUPPLE_E_OPEN_SURFACE).
 ///
 /// @param cubic_metres m^3, above zero.
 /// @param bulk Pa; 0: the volume is not asked for.
@@ -146,12 +147,12 @@ unsafe fn change(
     let set = || unsafe {
         let (object, mut arrays) = memory::open(pressure)?;
         let count = object.surfaces.into();
-        arrays.change::<PressedTriangle>(object.triangles as usize);
+        let triangles = arrays.change::<PressedTriangle>(object.triangles as usize);
         let surfaces = arrays.change::<SurfacePressure>(object.surfaces as usize);
         let place = surfaces.get_mut(surface as usize);
         let place = place.ok_or(supple_error::from(SUPPLE_E_CAPACITY).value(surface.into(), count))?;
         let asked = to(*place);
-        asked.check(surface as usize)?;
+        asked.check_on(surface as usize, triangles)?;
         *place = asked;
         Ok(SUPPLE_OK)
     };

@@ -41,6 +41,10 @@ pub const SUPPLE_REMARK_THIN: u32 = 12;
 /// All nodes of pull `index` are held: it moves nothing.
 pub const SUPPLE_REMARK_HELD_PULL: u32 = 13;
 
+/// Instrument `index` starts within the body, where it touches nothing and pushes the surface from within: let its path
+/// begin outside.
+pub const SUPPLE_REMARK_INSIDE: u32 = 14;
+
 /// What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -70,6 +74,7 @@ impl supple_remark {
             Remark::CountedFromOne => (SUPPLE_REMARK_COUNTED_FROM_ONE, SUPPLE_NONE, 0.0, 0.0),
             Remark::OtherTissue => (SUPPLE_REMARK_OTHER_TISSUE, SUPPLE_NONE, 0.0, 0.0),
             Remark::Thin(thickness) => (SUPPLE_REMARK_THIN, index, thickness as f64, 0.0),
+            Remark::Inside => (SUPPLE_REMARK_INSIDE, index, 0.0, 0.0),
             Remark::HeldPull => (SUPPLE_REMARK_HELD_PULL, index, 0.0, 0.0),
         };
         Self { kind, index, value, limit }
@@ -152,6 +157,7 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
         SUPPLE_REMARK_THIN => {
             c"an instrument thinner than edges of the surface are long: it needs the surface's triangles"
         }
+        SUPPLE_REMARK_INSIDE => c"an instrument that starts within the body: let its path begin outside",
         SUPPLE_REMARK_HELD_PULL => c"a pull all of whose nodes are held: it moves nothing",
         _ => c"?",
     };

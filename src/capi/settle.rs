@@ -71,7 +71,7 @@ pub extern "C" fn supple_settle_size(nodes: u32) -> usize {
 ///
 /// SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
 /// tells how much is missing, and another call goes on from there. Where a step is refused the status says why, and the
-/// state is that before it.
+/// body stands where the steps before have brought it.
 ///
 /// @param metre m, above zero.
 /// @param most_steps at least one is taken; each takes about as long as an exact one.

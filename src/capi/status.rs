@@ -195,6 +195,8 @@ pub enum supple_status {
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
     SUPPLE_E_DIVERGED_PRESSURE = -98,
+    /// Surface `index` is to be filled, but is open: it has no volume.
+    SUPPLE_E_OPEN_SURFACE = -99,
 }
 
 use supple_status::*;
@@ -308,6 +310,9 @@ impl From<BuildError> for supple_error {
             BuildError::DirectionCount { directions, elements } => {
                 is(SUPPLE_E_DIRECTION).value(directions as f64, elements as f64)
             }
+            BuildError::PointMass { node, kilogram, .. } => {
+                is(SUPPLE_E_NEGATIVE).node(node as u32).value(kilogram.into(), 0.0)
+            }
             BuildError::Direction { element, .. } => is(SUPPLE_E_DIRECTION).at(element),
             BuildError::NothingMoves => is(SUPPLE_E_NOTHING_MOVES),
         }
@@ -326,6 +331,7 @@ impl From<LoadError> for supple_error {
             LoadError::Filling { index, volume, bulk } => {
                 is(SUPPLE_E_NEGATIVE).at(index).value(if bulk < 0.0 { bulk } else { volume }.into(), 0.0)
             }
+            LoadError::Open { index } => is(SUPPLE_E_OPEN_SURFACE).at(index),
             LoadError::Surface { index, surface, surfaces } => {
                 is(SUPPLE_E_CAPACITY).at(index).value(surface.into(), surfaces as f64)
             }
@@ -491,6 +497,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -93 => c"the step was not taken: supports moved a node too far in one step",
         -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body: slower, shorter steps, or start outside",
         -98 => c"the step was not taken: a pressure would move a node through its tissue",
+        -99 => c"the surface is open, so it has no volume to be filled to: add the triangles that close it",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         -96 => c"the step was not taken: this kind of step does not know pulls",
         -97 => c"learned steps do not know tissue that relaxes or has fibres, or the state has no memory for what tissue remembers",

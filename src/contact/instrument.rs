@@ -1,5 +1,7 @@
 //! A rigid instrument: shape, friction, and where it moves.
 
+use glam::Vec3;
+
 use super::ContactError;
 use super::pose::{Placement, Pose};
 use super::shape::Shape;
@@ -64,6 +66,16 @@ impl<'a> Instrument<'a> {
     #[must_use]
     pub fn distance(&self, point: [f32; 3], time: f64) -> f32 {
         self.shape.nearest(self.placement(time).in_shape(point.into())).0
+    }
+
+    /// Where its centre is at first, and the ends of its axis, m.
+    pub(crate) fn axis(&self) -> [[f32; 3]; 3] {
+        let placement = self.placement(self.times[0]);
+        let half = match self.shape {
+            Shape::Capsule { length, .. } => 0.5 * length,
+            _ => 0.0,
+        };
+        [0.0, -half, half].map(|z| (placement.position + placement.turned(Vec3::Z * z)).to_array())
     }
 
     /// Where it is at `time`, s.

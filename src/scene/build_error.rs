@@ -88,6 +88,15 @@ pub enum BuildError {
         /// Elements of the mesh.
         elements: usize,
     },
+    /// A point mass that cannot be.
+    PointMass {
+        /// The node.
+        node: usize,
+        /// Nodes of the mesh.
+        nodes: usize,
+        /// The mass, kg.
+        kilogram: f32,
+    },
     /// The directions of the fibres in an element are no directions, or both the same.
     Direction {
         /// The element.
@@ -136,6 +145,12 @@ impl fmt::Display for BuildError {
             }
             Self::DirectionCount { directions, elements } => {
                 write!(f, "{directions} directions of fibres for {elements} elements: give one for each element")
+            }
+            Self::PointMass { node, nodes, kilogram } => {
+                write!(
+                    f,
+                    "a point mass of {kilogram} kg at node {node} of {nodes}: it must be a finite number, zero or more"
+                )
             }
             Self::Direction { element, fibre: [a, b, c], sheet: [d, e, g] } => write!(
                 f,

@@ -8,7 +8,7 @@ use crate::simd::TILE;
 
 impl SceneFacts {
     /// Takes note of other constants. Whether the tables are those of the new material as well: they are with the same
-    /// kind of element, regions and densities. Else, and on an error, nothing is changed.
+    /// kind of element, regions, densities and directions of fibres. Else, and on an error, nothing is changed.
     pub(crate) fn change_constants<M: Material, N: Material>(
         &mut self,
         tiles: &[ElementTile],
@@ -18,6 +18,9 @@ impl SceneFacts {
         let several = [old.laws().has_several_tissues(), new.laws().has_several_tissues()];
         let have = [terms_of(new), families_of(new)];
         if old.element() != new.element() || several[0] != several[1] || have != [self.terms, self.families] {
+            return Ok(false);
+        }
+        if self.families > 0 && old.directions() != new.directions() {
             return Ok(false);
         }
         let mut rounding = 0.0;
@@ -45,7 +48,8 @@ impl SceneFacts {
 impl<M: Material, S: SceneTables> Scene<M, S> {
     /// Gives the elements other constants, in a pass over them, as where tissue stiffens while it moves. Call
     /// [`tled::carry_on`](crate::tled::carry_on) afterwards. Whether it was done: a material of another kind of
-    /// element, with other regions or other densities needs a scene that is built anew, and changes nothing here.
+    /// element, with other regions, densities or directions of fibres needs a scene that is built anew, and changes
+    /// nothing here.
     pub fn set_constants(&mut self, material: M) -> Result<bool, BuildError> {
         let Self { material: old, tables, facts } = self;
         let is_done = facts.change_constants(tables.tables().1, old, &material)?;

@@ -57,7 +57,7 @@ impl<'a, M: Material> SceneView<'a, M> {
     }
 
     /// A checksum of what relaxes, in its order: memory of a state stays where it is in a scene with the same.
-    #[cfg(feature = "capi-neo-hookean")]
+    #[cfg(any(feature = "std", feature = "capi-neo-hookean", test))]
     pub(crate) fn memory_checksum(&self) -> u32 {
         let mut sum = crate::checksum::OfTables::new();
         if self.memory_vectors() > 0 {

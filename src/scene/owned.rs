@@ -181,14 +181,19 @@ impl<M: Material> VecScene<M> {
 
 #[cfg(feature = "std")]
 impl<M> VecScene<M> {
-    /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
-    pub fn add_mass(&mut self, node: usize, kilogram: f32) {
-        // One whose elements are all removed carries none.
-        if let Some(inertia) = self.tables.nodes.get_mut(node).filter(|inertia| !inertia.is_alone()) {
+    /// Adds a point mass (kg, not negative) to a node, which inertia, gravity and damping act on as on tissue. One whose elements
+    /// are all removed carries none.
+    pub fn add_mass(&mut self, node: usize, kilogram: f32) -> Result<(), BuildError> {
+        let nodes = self.tables.nodes.len();
+        let Some(inertia) = self.tables.nodes.get_mut(node).filter(|_| kilogram >= 0.0 && kilogram.is_finite()) else {
+            return Err(BuildError::PointMass { node, nodes, kilogram });
+        };
+        if !inertia.is_alone() {
             inertia.add_mass(kilogram);
-            self.facts.has_point_masses = true;
+            (self.facts.has_point_masses, self.facts.mass) = (true, self.facts.mass + f64::from(kilogram));
             self.tables.masses.push((node, kilogram));
         }
+        Ok(())
     }
 
     /// A scene of the same nodes and supports, of another material and without some elements. Point masses stay.
@@ -199,7 +204,7 @@ impl<M> VecScene<M> {
         let supports = std::vec::Vec::from_iter(self.view().supports());
         let mut scene = Self::build(material, mesh, &supports)?;
         for &(node, kilogram) in &self.tables.masses {
-            scene.add_mass(node, kilogram);
+            scene.add_mass(node, kilogram)?;
         }
         Ok(scene)
     }

@@ -47,11 +47,18 @@ impl Simulation<'_> {
     /// belong to no element any more stay in all arrays, held where they are. Pulls act on the nodes that are left of
     /// their patches, or are absent; a surface of [`Simulation::meeting`] follows, one of the caller's loses nodes;
     /// pressures act on what is left of their surfaces, not on the cut, and an open one fills no more.
-    /// Steps are prepared anew, with a lead-in where a network takes them. Reactions must be.
+    /// Steps are prepared anew, with a lead-in where a network takes them. Reactions must be. An ablation under way ends
+    /// where it is.
     ///
     /// It takes as long as building the scene and preparing the steps; with other constants only, and exact steps, as
     /// some of them. Where it is refused nothing has changed.
     pub fn exchange(&mut self, material: VecMaterial, removed: &[u32]) -> Result<(), SimulationError> {
+        self.go_on_with(material, removed)?;
+        self.changes.ablations.clear();
+        Ok(())
+    }
+
+    fn go_on_with(&mut self, material: VecMaterial, removed: &[u32]) -> Result<(), SimulationError> {
         let all = self.removed_with(removed)?;
         if removed.is_empty() {
             // Only constants may differ.
@@ -82,15 +89,15 @@ impl Simulation<'_> {
         self.go_on(Some(remembered), undo)
     }
 
-    /// Removes elements, as a resection does: see [`Simulation::exchange`].
+    /// Removes elements, as a resection does: see [`Simulation::exchange`]. An ablation goes on.
     pub fn remove(&mut self, elements: &[u32]) -> Result<(), SimulationError> {
-        self.exchange(self.scene.material().clone(), elements)
+        self.go_on_with(self.scene.material().clone(), elements)
     }
 
     /// Lets the constants of some elements change evenly to those of `law`, the law that the tissue has, over `seconds`
     /// from now on; zero: at once. Densities stay. These elements become tissues of their own at once, for which the
     /// scene is built anew; then constants change in 20 stages, each at the begin of a call of [`Simulation::advance`],
-    /// so calls should be shorter than a stage. A stage takes as long as some thirty exact steps; with steps that choose their
+    /// so calls should be shorter than a stage. Where the state is reset, or put back to a time before it began, it ends where it is. A stage takes as long as some thirty exact steps; with steps that choose their
     /// length, and the last one with long steps, as long as preparing the steps.
     pub fn ablate(&mut self, elements: &[u32], law: impl Into<AnyLaw>, seconds: f64) -> Result<(), SimulationError> {
         let (law, count) = (law.into(), self.tets.len());
@@ -132,18 +139,27 @@ impl Simulation<'_> {
             });
             *place = u16::try_from(number).ok().filter(|&number| number < u16::MAX).ok_or(SimulationError::Ablation)?;
         }
-        self.exchange(material, &[])?;
+        self.go_on_with(material, &[])?;
         // A tissue that is on its way elsewhere stays there where it was ablated again.
         self.changes.ablations.extend(ablations);
         Ok(())
     }
 
-    /// The next stage of each ablation, if it is due.
-    pub(super) fn ablate_on(&mut self) -> Result<(), SimulationError> {
+    /// Before a call: the state may be another one, and a stage of an ablation due.
+    pub(super) fn take_note(&mut self) -> Result<(), SimulationError> {
+        let (nodes, room) = (self.scene.node_count(), self.state.view().capacity_for(self.scene.view().element()));
+        if room < nodes {
+            return Err(SimulationError::Room { nodes, room });
+        }
+        self.state.forget_other(self.scene.view().memory_vectors(), self.tables);
+        let now = self.state.time();
+        self.changes
+            .ablations
+            .retain(|ablation| ablation.start < now || (ablation.start == now && ablation.stage == 0));
         if self.changes.ablations.is_empty() {
             return Ok(());
         }
-        let (now, mut ablations) = (self.state.time(), self.changes.ablations.clone());
+        let mut ablations = self.changes.ablations.clone();
         let mut material = self.scene.material().clone();
         let mut is_due = false;
         for ablation in &mut ablations {
@@ -156,7 +172,7 @@ impl Simulation<'_> {
         if is_due {
             let is_last = ablations.iter().any(|ablation| ablation.stage == STAGES);
             if !self.keeps_steps(&material, is_last)? {
-                self.exchange(material, &[])?;
+                self.go_on_with(material, &[])?;
             }
             ablations.retain(|ablation| ablation.stage < STAGES);
             self.changes.ablations = ablations;
@@ -212,7 +228,7 @@ impl Simulation<'_> {
     ) -> Result<(), SimulationError> {
         let (state, prepared) = (self.state.clone(), self.prepared.take());
         if let Some(remembered) = remembered {
-            self.state.remember(remembered);
+            self.state.remember(remembered, self.scene.view().memory_checksum());
         }
         let was_prepared = prepared.is_some();
         let answer = self.go_on_prepared(was_prepared);
@@ -220,6 +236,7 @@ impl Simulation<'_> {
             undo(self);
             (self.state, self.prepared) = (state, prepared);
         }
+        self.tables = self.scene.view().memory_checksum();
         answer
     }
 

@@ -38,7 +38,9 @@ pub use report::Report;
 use crate::inertia;
 use crate::mlp::Network;
 #[cfg(feature = "std")]
-use crate::step::Work;
+use crate::step::{CriticalStep, Step, Work};
+#[cfg(feature = "std")]
+use crate::tled::Pace;
 
 /// How a scene is moved.
 #[derive(Clone, Debug, Default)]
@@ -103,6 +105,22 @@ impl Default for Settings<'_> {
 }
 
 impl Settings<'_> {
+    /// Before anything is changed for them.
+    #[cfg(feature = "std")]
+    fn check(&self, critical: CriticalStep) -> Result<(), SimulationError> {
+        if let Some(metres) = self.tolerance.filter(|metres| !(*metres > 0.0 && metres.is_finite())) {
+            return Err(SimulationError::Tolerance(metres));
+        }
+        let seconds = self.step.unwrap_or(critical.seconds);
+        match self.method {
+            Method::Exact | Method::Learned { .. } if !self.unchecked => {
+                _ = Pace::of(self.step, self.damping, critical)?
+            }
+            _ => _ = Step::unchecked(seconds, self.damping)?,
+        }
+        Ok(())
+    }
+
     /// Of a call.
     #[cfg(feature = "std")]
     fn work(&self) -> Work {

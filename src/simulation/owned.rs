@@ -48,6 +48,8 @@ pub struct Simulation<'w> {
     pub(super) state: VecState,
     settings: Settings<'w>,
     pub(super) touchable: Touchable,
+    /// Checksum of the tables of what relaxes.
+    pub(super) tables: u32,
     /// What has been removed, and what is being ablated.
     pub(super) changes: Changes,
     /// Room for where motions are in the next step.
@@ -125,6 +127,7 @@ impl<'w> Simulation<'w> {
             points,
             tets,
             state: VecState::of(scene.view()),
+            tables: scene.view().memory_checksum(),
             scene,
             settings: Settings::default(),
             touchable: (vec![], vec![]),
@@ -168,9 +171,9 @@ impl<'w> Simulation<'w> {
 
     /// The same with a surface of the caller's.
     pub fn meet(&mut self, nodes: Vec<SurfaceNode>, triangles: Vec<[u32; 3]>) -> Result<(), SimulationError> {
-        (self.touchable, self.changes.meets_boundary) = ((nodes, triangles), false);
-        let surface = surface(&self.touchable, self.scene.node_count())?;
-        self.state.make_room(&surface);
+        let touchable = (nodes, triangles);
+        self.state.make_room(&surface(&touchable, self.scene.node_count())?);
+        (self.touchable, self.changes.meets_boundary) = (touchable, false);
         Ok(())
     }
 
@@ -224,7 +227,7 @@ impl<'w> Simulation<'w> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(SimulationError::Seconds(seconds));
         }
-        self.ablate_on()?;
+        self.take_note()?;
         self.prepare_once()?;
         let work = self.settings.work();
         let Acting { mut loads, scene, state, prepared, clock } = self.acting()?;
@@ -249,7 +252,7 @@ impl<'w> Simulation<'w> {
         mut loads: &mut dyn LoadsOverTime,
         watch: &mut dyn FnMut(Event<'_>),
     ) -> Result<Report, SimulationError> {
-        self.ablate_on()?;
+        self.take_note()?;
         if let Some(mut former) = self.former.take() {
             let (critical, Self { scene, state, .. }) = (self.critical_step()?, &mut *self);
             former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), &CallingThread);
@@ -294,6 +297,7 @@ impl<'w> Simulation<'w> {
     /// is wrong with the settings is told.
     pub fn prepare(&mut self) -> Result<(), SimulationError> {
         let critical = self.critical_step()?;
+        self.settings.check(critical)?;
         if let Some(mut former) = self.former.take() {
             let Acting { mut loads, scene, state, .. } = self.acting()?;
             former.mover().end_long_steps(critical.seconds, scene.view(), &mut loads, state.view(), &CallingThread);
@@ -374,7 +378,7 @@ impl<'w> Simulation<'w> {
     }
 
     /// The same, to be changed: reset, restored, started elsewhere. Steps go on from there, a network's after a new
-    /// lead-in. Lengths that are chosen at [`Simulation::prepare`], those of long steps and the longest of
+    /// lead-in; tissue that relaxes remembers nothing after a state of other elements, as before some were removed. Lengths that are chosen at [`Simulation::prepare`], those of long steps and the longest of
     /// [`Method::Auto`], stay as they are.
     pub const fn state_mut(&mut self) -> &mut VecState {
         &mut self.state
@@ -490,6 +494,15 @@ pub enum SimulationError {
     },
     /// An ablation to another law than that of the tissue, or of nothing, or to more tissues than there can be.
     Ablation,
+    /// A tolerance (m) that is none.
+    Tolerance(f32),
+    /// The state is of another scene.
+    Room {
+        /// Nodes of the scene.
+        nodes: usize,
+        /// Nodes that the state has room for.
+        room: usize,
+    },
     /// A step was refused: the state is that before it.
     Refused(Divergence),
 }
@@ -514,6 +527,8 @@ impl fmt::Display for SimulationError {
                 write!(f, "element {element} does not exist, the mesh has {elements} elements")
             }
             Self::Ablation => f.write_str("an ablation needs elements that are there, and the law that the tissue has"),
+            Self::Tolerance(metres) => write!(f, "a tolerance of {metres} m: it must be a positive number"),
+            Self::Room { nodes, room } => write!(f, "the state has room for {room} nodes, the scene has {nodes}"),
             Self::Refused(divergence) => divergence.fmt(f),
         }
     }

@@ -14,7 +14,7 @@ impl Simulation<'_> {
     /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
     /// time, which stands still, the points of pulls turned with the body as it is before ([`Simulation::turn_pulls`]), and
     /// velocities are zero afterwards; ablations are as far as they are due, and steps of every method go on from there. Where a
-    /// step is refused the error says why, and the state is that before it.
+    /// step is refused the error says why; the body then stands where the steps before have brought it.
     pub fn settle(&mut self, metre: f32, most_steps: u32) -> Result<Settled, SimulationError> {
         self.settle_in_parts(metre, most_steps, &CallingThread)
     }
@@ -26,7 +26,7 @@ impl Simulation<'_> {
         most_steps: u32,
         threads: &impl Threads,
     ) -> Result<Settled, SimulationError> {
-        self.ablate_on()?;
+        self.take_note()?;
         // What is refused turns nothing.
         self.acting()?;
         self.turn_pulls();
@@ -46,7 +46,7 @@ impl Simulation<'_> {
         most_steps: u32,
         mut loads: &mut dyn LoadsOverTime,
     ) -> Result<Settled, SimulationError> {
-        self.ablate_on()?;
+        self.take_note()?;
         let (scene, state) = self.parts_mut();
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
         let (view, state) = (scene.view(), state.view());

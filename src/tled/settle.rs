@@ -33,7 +33,7 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
-use crate::step::{CallingThread, Cause, Divergence, Status, Step, Threads, Trial};
+use crate::step::{CallingThread, Cause, Divergence, EnergyBalance, Status, Step, Threads, Trial};
 
 use super::conjugate::{Conjugate, Line};
 use super::critical::each_rate;
@@ -87,7 +87,7 @@ pub struct Settled {
     pub remaining: f32,
     /// Steps that were computed.
     pub steps: u32,
-    /// That of the last step.
+    /// That of the last step, without what its energy would say.
     pub status: Status,
 }
 
@@ -219,9 +219,14 @@ pub fn settle_in_parts<M: ElementMaterial>(
     }
     state.progress.time = time;
     let settled = run.settled;
+    let status = match settled.status {
+        // The energy of these steps, of other masses, is none of the body's.
+        Status::Limited { .. } => Status::of_taken(&state.progress.extremes, &EnergyBalance::NEW, false),
+        status => status,
+    };
     // It has been before.
     let _ = stop_in(scene, state);
-    Ok(Settled { at_rest: settled.status.is_taken() && settled.remaining < metre, ..settled })
+    Ok(Settled { at_rest: status.is_taken() && settled.remaining < metre, status, ..settled })
 }
 
 /// The parts of the storage: unit masses along free axes, where a swing began, forces at the base of a line, bounds.

@@ -762,7 +762,7 @@ static void remarks(supple_scene_config config) {
     DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
     CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
     CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
-    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_HELD_PULL; kind++) {
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_INSIDE; kind++) {
         CHECK(strlen(supple_remark_text(kind)) > 10);
     }
     CHECK(strcmp(supple_remark_text(0), "?") == 0);
@@ -869,6 +869,10 @@ static void pressures_and_rest(void) {
     REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_fill(pressure, 0, NAN, 1.0f));
     REFUSED(SUPPLE_E_CAPACITY, supple_pressure_fill(pressure, 2, 1e-3f, 1.0f));
     REFUSED(SUPPLE_E_MISMATCH, supple_pressure_now(pressure, small_state, 0, &volume, NULL));
+    /* Without its first triangle a surface is open, without any it is nothing. */
+    DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[1], NULL, count - 1, 1, &pressure, &error));
+    REFUSED(SUPPLE_E_OPEN_SURFACE, supple_pressure_fill(pressure, 0, 1e-3f, 1.0f));
+    DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[0], surface_of, count, 2, &pressure, &error));
 
     DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
     DONE(supple_set_forces(loads, NULL, 0, NULL));

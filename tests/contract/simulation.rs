@@ -333,6 +333,16 @@ fn what_is_refused_is_told_and_leaves_the_motion_as_it_was() {
     let error = simulation.advance(FRAME).unwrap_err().to_string();
     println!("{error}");
     assert!(error.contains("is above the stable"), "{error}");
+    for (settings, words) in [
+        (Settings { tolerance: Some(f32::NAN), ..Settings::default() }, "a tolerance of NaN m"),
+        (Settings { tolerance: Some(-1.0), ..Settings::default() }, "a tolerance of -1 m"),
+        (Settings { damping: -1.0, ..Settings::default() }, "damping"),
+    ] {
+        simulation.set(settings);
+        let error = simulation.advance(FRAME).unwrap_err().to_string();
+        println!("{error}");
+        assert!(error.contains(words), "{error}");
+    }
     simulation.set(Settings { damping: DAMPING, ..Settings::default() });
     assert_eq!(bits(simulation.state()), before);
     // A call after a refused one is no longer for it.
@@ -398,6 +408,72 @@ fn settings_may_change_from_long_to_exact_steps() {
         assert!(reports.iter().all(|report| report.undone == 0 && report.is_ok()), "{reports:?}");
         // What long steps leave strained is set free, and no more: without care it is three times as much.
         assert!(kinetic < 15.0 * of_exact && of_exact > 1e-6);
+    }
+}
+
+/// Long steps leave velocities that the refusal of other settings leaves as they are; of a state without room nothing is taken.
+#[test]
+fn refused_settings_after_long_steps_change_no_velocity() {
+    let body = small_bar();
+    let mut simulation =
+        twisted(&body, Settings { method: Method::Long(long()), damping: DAMPING, ..Settings::default() });
+    frames(&mut simulation, 4);
+    let velocities = |simulation: &Simulation<'static>| {
+        (0..body.points.len()).map(|node| simulation.state().velocity(node)).collect::<Vec<_>>()
+    };
+    let before = velocities(&simulation);
+    simulation.set(Settings { damping: -1.0, ..Settings::default() });
+    println!("{}", simulation.advance(FRAME).unwrap_err());
+    assert_eq!(velocities(&simulation), before);
+    simulation.set(Settings { damping: DAMPING, ..Settings::default() });
+    *simulation.state_mut() = VecState::at_rest(3);
+    let error = simulation.advance(FRAME).unwrap_err().to_string();
+    println!("{error}");
+    assert!(error.contains("room for 3 nodes"), "{error}");
+}
+
+/// What a host loads the body with when it changes the kind of step has acted for no time yet: from rest and in motion exact steps go
+/// on as if the load had come a frame after the change.
+#[test]
+fn a_load_that_comes_with_other_steps_gives_no_velocity() {
+    let body = small_bar();
+    let far = far_end(&body);
+    for element in [Element::Linear, Element::NodalStrain] {
+        let moved = |before: f32, is_late: bool, load: &dyn Fn(&mut Simulation<'static>)| {
+            let made = Simulation::new(body.points.clone(), body.tets.clone(), material(element), &held(&body));
+            let long = Settings { method: Method::Long(long()), damping: DAMPING, ..Settings::default() };
+            let mut simulation = made.unwrap().with(long);
+            simulation.gravity = [before, 0.0, 0.0];
+            frames(&mut simulation, 3);
+            if is_late {
+                simulation.set(Settings { damping: DAMPING, ..Settings::default() });
+                simulation.prepare().unwrap();
+                load(&mut simulation);
+            } else {
+                load(&mut simulation);
+                simulation.set(Settings { damping: DAMPING, ..Settings::default() });
+            }
+            simulation.advance(0.5 * FRAME).unwrap();
+            simulation.displacements()[far[0] as usize].to_array()[0]
+        };
+        for before in [0.0, 3.0] {
+            let gravity = |simulation: &mut Simulation<'static>| simulation.gravity = [12.0, 0.0, 0.0];
+            let force = |simulation: &mut Simulation<'static>| {
+                simulation.forces =
+                    far.iter().map(|&node| NodalForce { node, newton: [1e-3, 0.0, 0.0], ramp: 0.0 }).collect();
+            };
+            type Load<'a> = &'a dyn Fn(&mut Simulation<'static>);
+            let loads: [(&str, Load<'_>, f32); 2] = [("gravity", &gravity, 0.001), ("forces", &force, 0.2)];
+            for (name, load, off) in loads {
+                let [with, after] = [false, true].map(|is_late| moved(before, is_late, load));
+                println!(
+                    "{element:?}, {before} m/s^2 before, {name}: {:.4} mm, loaded after {:.4}",
+                    1e3 * with,
+                    1e3 * after
+                );
+                assert!((with - after).abs() <= off * after.abs() && after > 1e-5);
+            }
+        }
     }
 }
 

@@ -203,3 +203,60 @@ fn steps_that_cannot_be_prepared_leave_all_as_it_was() {
     assert_eq!(body.displacements(), before);
     assert!(!body.is_removed(0) && body.advance(0.05).unwrap().long > 0);
 }
+
+/// Another material ends an ablation where it is, so that it changes nothing of it; a removal does not. Put back to a time before it
+/// began it ends as well.
+#[test]
+fn another_material_ends_an_ablation() {
+    let region = elements_where(|[_, _, z]| z > 0.05);
+    let other = NeoHookean { c: 700.0, d: 14_000.0 };
+    let begun = || {
+        let mut body = bar(Element::NodalStrain).with(settings(Method::Exact, 30.0));
+        body.ablate(&region, STIFF, 0.2).unwrap();
+        (0..6).for_each(|_| _ = body.advance(0.02).unwrap());
+        body
+    };
+    let constants = |body: &Simulation<'static>| body.scene().material().tissues.last().unwrap().constants[0];
+    let mut exchanged = begun();
+    let half = constants(&exchanged);
+    exchanged.exchange(VecMaterial::one(Element::NodalStrain, other, DENSITY), &[]).unwrap();
+    let mut removed = begun();
+    removed.remove(&[0]).unwrap();
+    let mut reset = begun();
+    reset.state_mut().reset();
+    for body in [&mut exchanged, &mut removed, &mut reset] {
+        (0..8).for_each(|_| _ = body.advance(0.04).unwrap());
+    }
+    let [exchanged, removed, reset] = [&exchanged, &removed, &reset].map(constants);
+    println!(
+        "half way {half} Pa, with another material {exchanged}, without an element {removed}, after a reset {reset}"
+    );
+    assert!(half > 1.2 * SOFT.c && half < 0.9 * STIFF.c);
+    assert_eq!([exchanged, removed, reset], [other.c, STIFF.c, half]);
+}
+
+/// Fibres in other directions are those of a body that was built so; what are no directions is refused, and nothing changes.
+#[test]
+fn other_directions_of_fibres_are_taken_over() {
+    let tissue = |fibre: [f32; 3], count: usize| VecMaterial {
+        fibres: vec![Fibres::new([Some([20_000.0, 1.0]), None, None]).unwrap()],
+        directions: vec![Directions { fibre, ..Directions::default() }; count],
+        ..VecMaterial::one(Element::NodalStrain, SOFT, DENSITY)
+    };
+    let supports: Vec<_> = (0..25).map(Support::fixed).collect();
+    let count = BAR.element_count();
+    let built = |fibre| {
+        let made = Simulation::new(BAR.points(), BAR.tets(), tissue(fibre, count), &supports).unwrap();
+        made.with(settings(Method::Exact, 30.0))
+    };
+    let mut exchanged = built([1.0, 0.0, 0.0]);
+    for wrong in [tissue([0.0; 3], count), tissue([0.0, 0.0, 1.0], 3)] {
+        println!("{}", exchanged.exchange(wrong, &[]).unwrap_err());
+    }
+    exchanged.exchange(tissue([0.0, 0.0, 1.0], count), &[]).unwrap();
+    let [exchanged, along, across] =
+        [exchanged, built([0.0, 0.0, 1.0]), built([1.0, 0.0, 0.0])].map(|body| at_rest_under_gravity(body, 0.5));
+    let [(off, moved), (other, _)] = [difference(&exchanged, &along), difference(&exchanged, &across)];
+    println!("{:.4} mm off of {:.2} mm, {:.2} mm from that with fibres across", 1e3 * off, 1e3 * moved, 1e3 * other);
+    assert!(off < 1e-3 * moved && other > 0.05 * moved);
+}

@@ -5,10 +5,11 @@ use super::*;
 use glam::DVec3;
 use supple::contact::{Instrument, Pose, Shape};
 use supple::loads::Loads;
+use supple::material::Prony;
 use supple::mesh::{Mesh, Winding, boundary};
 use supple::pressure::SurfacePressure;
 use supple::scene::FixedScene;
-use supple::state::{FixedState, NodeVector};
+use supple::state::{FixedState, NodeVector, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 
@@ -227,25 +228,22 @@ fn pressures_let_go_of_the_surface_that_is_removed() {
     let tets: Vec<_> = BAR.tets().collect();
     let faces = |with_gone: bool| {
         let of = (0..).zip(&tets).filter(|(element, _)| with_gone || !gone.contains(element)).map(|(_, tet)| *tet);
-        let mut faces = boundary(of);
-        faces.retain(|nodes| nodes.iter().any(|&node| points[node as usize][2] > 0.0));
-        faces
+        boundary(of)
     };
     let (all, left) = (faces(true), faces(false));
     let skin: Vec<_> = left.iter().copied().filter(|face| all.contains(face)).collect();
     assert!(skin.len() < left.len() && skin.len() < all.len());
-    let pressed = |triangles: &[[u32; 3]]| {
+    let pressed = |triangles: &[[u32; 3]], bulk: f32| {
         let mut body = bar(Element::NodalStrain).with(settings(Method::Exact, 30.0));
-        let pressure = SurfacePressure { volume: 1e-4, bulk: 1.0, ..SurfacePressure::new(20.0, 0.0) };
+        let pressure = SurfacePressure { volume: 1e-4, bulk, ..SurfacePressure::new(20.0, 0.0) };
         body.pressures.press(&points, triangles, pressure).unwrap();
         body
     };
-    let mut cut = pressed(&all);
+    let mut cut = pressed(&all, 1.0);
     cut.advance(0.05).unwrap();
     cut.remove(&gone).unwrap();
     assert_eq!(cut.pressures.surfaces[0].bulk, 0.0);
-    let mut never = pressed(&skin);
-    never.pressures.surfaces[0].bulk = 0.0;
+    let mut never = pressed(&skin, 0.0);
     never.remove(&gone).unwrap();
     for body in [&mut cut, &mut never] {
         assert!(body.settle(1e-6, 20_000).unwrap().at_rest);
@@ -364,8 +362,8 @@ fn point_masses_and_surfaces_of_the_callers_stay() {
     let tissue = VecMaterial::one(Element::NodalPressure, SOFT, DENSITY);
     let mut scene = supple::scene::VecScene::build(tissue, &mesh, &supports).unwrap();
     let (stays, goes) = (BAR.node(2, 2, 8) as usize, BAR.node(2, 2, 16) as usize);
-    scene.add_mass(stays, 0.01);
-    scene.add_mass(goes, 0.01);
+    scene.add_mass(stays, 0.01).unwrap();
+    scene.add_mass(goes, 0.01).unwrap();
     let nodes = supple::contact::boundary(&mesh);
     let triangles = supple::contact::boundary_triangles(&mesh, &nodes);
     let before = (nodes.len(), triangles.len());
@@ -405,4 +403,53 @@ fn learned_steps_are_led_again() {
     println!("{report:?}");
     assert!(report.exact > 0 && report.status.is_taken());
     assert!(body.displacements().iter().all(|vector| vector.to_array().iter().all(|x| x.is_finite())));
+}
+
+/// A point mass counts in the mass, and one that cannot be is refused with its node.
+#[test]
+fn a_point_mass_is_of_the_scene_or_refused() {
+    let mut scene = bar(Element::Linear).scene().clone();
+    let before = scene.view().mass();
+    scene.add_mass(3, 0.05).unwrap();
+    assert!((scene.view().mass() - before - 0.05).abs() < 1e-7);
+    for (node, kilogram) in [(3, -0.06), (3, f32::NAN), (3, f32::INFINITY), (100_000, 0.1)] {
+        let error = scene.add_mass(node, kilogram).unwrap_err().to_string();
+        println!("{error}");
+        assert!(error.contains(&format!("node {node}")), "{error}");
+    }
+}
+
+/// A state of before a removal, put back after it, remembers other elements: it begins as if it remembered nothing.
+#[test]
+fn a_state_of_before_a_removal_remembers_nothing_of_other_elements() {
+    let series = Prony::new(&[[0.5, 0.2]]).unwrap();
+    for element in ELEMENTS {
+        let material = VecMaterial { prony: vec![series], ..VecMaterial::one(element, SOFT, DENSITY) };
+        let supports: Vec<_> = (0..25).map(Support::fixed).collect();
+        let mut body = Simulation::new(BAR.points(), BAR.tets(), material, &supports).unwrap();
+        body = body.with(settings(Method::Exact, 30.0));
+        body.gravity = [6.0, 0.0, 0.0];
+        (0..6).for_each(|_| _ = body.advance(0.02).unwrap());
+        let mut saved = body.state().clone();
+        body.remove(&(0..6).collect::<Vec<_>>()).unwrap();
+        let mut without = VecState::of(body.scene().view());
+        let seconds = saved.view().last_step();
+        without.view().put(saved.time(), seconds, |node| {
+            [saved.displacements()[node].to_array(), saved.velocity(node).map(|speed| seconds * speed)]
+        });
+        for state in [&mut saved, &mut without] {
+            assert!(tled::carry_on(body.scene(), state));
+        }
+        let ended = [saved, without].map(|state| {
+            *body.state_mut() = state;
+            (0..3).for_each(|_| _ = body.advance(0.02).unwrap());
+            body.displacements().to_vec()
+        });
+        let moved = ended[0].iter().map(|u| glam::Vec3::from(u.to_array()).length()).fold(0.0, f32::max);
+        let off =
+            ended[0].iter().zip(&ended[1]).map(|(a, b)| glam::Vec3::from(a.to_array()).distance(b.to_array().into()));
+        let off = off.fold(0.0, f32::max);
+        println!("{element:?}: {:.4} mm off of {:.2} mm", 1e3 * off, 1e3 * moved);
+        assert!(off < 0.01 * moved && moved > 1e-3);
+    }
 }

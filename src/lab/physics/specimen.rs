@@ -114,7 +114,7 @@ impl Specimen {
         let material = VecMaterial::one(element, self.elastic.law(), self.density);
         let mut scene = VecScene::build(material, &mesh, &self.supports)?;
         for &(node, kilogram) in &self.masses {
-            scene.add_mass(node as usize, kilogram);
+            scene.add_mass(node as usize, kilogram)?;
         }
         Ok(scene)
     }

@@ -44,7 +44,7 @@ impl Figures {
         Self {
             nodes: scene.node_count(),
             elements: scene.element_count(),
-            mass: setup.mass(scene),
+            mass: scene.mass(),
             time: state.time(),
             steps,
             steps_undone: outcome.computed.saturating_sub(steps),

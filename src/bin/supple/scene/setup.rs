@@ -168,7 +168,7 @@ impl Setup {
             error => Problem(format!("{}: {error}", self.body.name)),
         })?;
         for &(node, kilogram) in &self.masses {
-            scene.add_mass(node as usize, kilogram);
+            scene.add_mass(node as usize, kilogram).map_err(|error| Problem(format!("{}: {error}", self.body.name)))?;
         }
         Ok(scene)
     }
@@ -217,11 +217,6 @@ impl Setup {
     /// Whether neither supports nor springs and pulls hold it, and no instrument could.
     pub(crate) fn is_free(&self) -> bool {
         self.supports.is_empty() && self.pulls.len() == 0 && self.instruments.is_empty()
-    }
-
-    /// The mass of the tissue and of what hangs on it, kg.
-    pub(crate) fn mass(&self, scene: SceneView<'_, VecMaterial>) -> f64 {
-        scene.mass() + self.masses.iter().map(|(_, kilogram)| f64::from(*kilogram)).sum::<f64>()
     }
 
     /// The longest time over which a load rises, s.
