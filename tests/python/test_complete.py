@@ -239,3 +239,14 @@ def test_a_ball_as_large_as_an_edge_touches_triangles_by_itself(soft):
     # A ball thicker than the diagonal of a cell meets nodes, which costs less.
     (chosen, said), (nodes, warned) = (press(soft, triangles, 0.0142) for triangles in (None, False))
     assert chosen == nodes > 0.0 and said == warned
+
+
+def test_an_instrument_that_starts_within_the_body_is_remarked_upon():
+    mesh = supple.Mesh.box((0.06, 0.04, 0.04), (6, 4, 4))
+    simulation = supple.Simulation(supple.Scene(mesh, supple.Material.from_moduli(4e3, 0.45, density=1000.0), fixed=mesh.points[:, 0] < 1e-6))
+    for place, within in ([0.03, 0.02, 0.02], True), ([0.03, 0.02, 0.055], False):
+        for instrument in supple.Instrument.sphere(0.006, place), supple.Instrument.capsule(0.003, 0.01, place):
+            simulation.set_instruments([instrument], triangles=True)
+            said = simulation.remarks()
+            print(said)
+            assert said == (["instrument 0: an instrument that starts within the body: let its path begin outside"] if within else [])

@@ -230,6 +230,8 @@ SIMULATED = [
     (lambda scene, sim: sim.pull([[0.01, 0.01, 0.03]], radius="1 cm"), "radius '1 cm': it must be a number"),
     (lambda scene, sim: sim.set_instruments(supple.Instrument.sphere(0.01, [0, 0, 0.2])), "instruments: Instrument is given, a list of Instrument is needed"),
     (lambda scene, sim: sim.set_instruments([scene]), "instruments: entry 0 is <supple.Scene: "),
+    (lambda scene, sim: sim.pull([[0.01, 0.01, 0.08]] * 2, stiffness=[100.0, -5.0]), "stiffness of row 1: -5 N/m, it must be from 0 to 1e\\+06"),
+    (lambda scene, sim: supple.Material.from_moduli(0.0, 0.3, density=1000.0), "Young's modulus 0.0: it must be a positive number"),
     (lambda scene, sim: sim.set_instruments([supple.Instrument.sphere("1", [0, 0, 0.2])]), "radius '1': it must be a number"),
     (lambda scene, sim: sim.exchange(scene.mesh), "exchange with <supple.Mesh: .*: it must be a Scene"),
     (lambda scene, sim: sim.ablate([0], 1e4, 1.0), "ablate to 10000.0: it must be a Material"),

@@ -165,7 +165,7 @@ class _Problem:
             raise InputError(f"bounds of {name}: {least} and {most}, the first must be below the second")
         if not least <= first <= most:
             raise InputError(f"start of {name}: {first}, it must be from {least} to {most}")
-        return least, most
+        return float(least), float(most)
 
     def coordinates(self, values: Floats) -> Floats:
         # No inverse is taken of what may be zero.
@@ -193,6 +193,10 @@ class _Problem:
             found = np.array(self.simulate(dict(zip(self.names, values.tolist()))), np.float64)
             if found.shape != self.measured.shape:
                 raise InputError(f"simulate: its displacements are of shape {found.shape}, those measured of {self.measured.shape}")
+            bad = np.flatnonzero((self.is_fitted & ~np.isfinite(found)).any(axis=1))
+            if len(bad):
+                tried = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, values))
+                raise InputError(f"simulate: the displacement of point {bad[0]} is {found[bad[0]].tolist()} with {tried}; where it cannot tell, raise supple.Error")
             self.done[key] = found
         return self.done[key]
 

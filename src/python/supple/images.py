@@ -62,6 +62,7 @@ class Grid:
 
     def coarser(self, factor: int) -> Grid:
         """The same box, with every `factor`-th point, and one more where these do not reach its end."""
+        factor = library.whole(factor, "factor", 1 << 31)
         size = tuple(-(-(count - 1) // factor) + 1 for count in self.size)
         return dataclasses.replace(self, spacing=tuple(factor * each for each in self.spacing), size=size)
 

@@ -15,6 +15,8 @@ from .errors import InputError
 if TYPE_CHECKING:
     from .simulation import Simulation
 
+# N/m.
+_STIFFEST = 1e6
 # As supple_pulled.
 _PULLED = np.dtype([("point", np.float32, 3), ("gap", np.float32, 3), ("force", np.float32, 3)])
 
@@ -77,7 +79,10 @@ class PullMemory:
         self.raw, points = made[0], library.pointer("float", nodes)
         for group in groups:
             for index in range(len(group.points)):
-                library.checked(lib.supple_add_pull(self.raw, simulation._raw_scene, points, group.row(index), error), error, "pulls")
+                status = lib.supple_add_pull(self.raw, simulation._raw_scene, points, group.row(index), error)
+                # Of those that were asked for together.
+                error.index = index
+                library.checked(status, error, "pulls")
         first, now = 0, simulation.time
         for group in groups:
             # On its way.
@@ -160,4 +165,7 @@ def wanted_of(points: ArrayLike, radius: float, stiffness: ArrayLike, most: floa
         stiff = np.broadcast_to(np.asarray(stiffness, np.float32), (len(rows),)).copy()
     except (TypeError, ValueError):
         raise InputError(f"stiffness {stiffness!r}: it must be one number, N/m, or one for each of {len(rows)} points") from None
+    wrong = np.flatnonzero(~((stiff >= 0.0) & (stiff <= _STIFFEST)))
+    if len(wrong):
+        raise InputError(f"stiffness of row {wrong[0]}: {stiff[wrong[0]]:g} N/m, it must be from 0 to {_STIFFEST:g}")
     return Wanted(rows, np.full_like(rows, np.nan), radius, stiff, most or 0.0, directions)

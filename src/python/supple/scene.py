@@ -77,7 +77,8 @@ class Material:
     ) -> Material:
         """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus.
         Those are of the tissue without its fibres."""
-        library.number(young, "Young's modulus")
+        if not 0.0 < library.number(young, "Young's modulus") < np.inf:
+            raise InputError(f"Young's modulus {young}: it must be a positive number, Pa")
         if not -1.0 < library.number(poisson, "Poisson's ratio") < 0.5:
             raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
         c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))

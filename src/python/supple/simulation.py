@@ -49,6 +49,7 @@ _PLACES = {
     lib.SUPPLE_REMARK_WAY: "motion",
     lib.SUPPLE_REMARK_SPEED: "motion",
     lib.SUPPLE_REMARK_THIN: "instrument",
+    lib.SUPPLE_REMARK_INSIDE: "instrument",
     lib.SUPPLE_REMARK_HELD_PULL: "pull",
 }
 # As supple_force and supple_motion.
@@ -358,7 +359,7 @@ class Simulation:
     @_one_at_a_time
     def move(self, instrument: int, position: ArrayLike, rotation: ArrayLike | None = None, *, within: float) -> None:
         """Lets an instrument go on a line, and turn evenly, to a pose in the next `within` seconds."""
-        self._touching(instrument).move(instrument, position, rotation, self.time, self.time + library.number(within, "within"))
+        self._touching(instrument).move(instrument, position, rotation, self.time, self.time + library.not_negative(within, "within", "s"))
 
     @_one_at_a_time
     def touch(self, instrument: int) -> Touch:
@@ -369,7 +370,7 @@ class Simulation:
     def grasp(self, instrument: int, within: float) -> int:
         """Lets an instrument hold the nodes of the surface that are nearer than `within` (m), until `let_go`. Gives how many it holds."""
         held = ffi.new("uint32_t *")
-        status = lib.supple_grasp(self._touching(instrument).raw, self._state, instrument, library.number(within, "within"), held)
+        status = lib.supple_grasp(self._touching(instrument).raw, self._state, instrument, library.not_negative(within, "within", "m"), held)
         library.checked(status, what=f"instrument {instrument}")
         return int(held[0])
 
