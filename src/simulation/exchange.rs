@@ -97,8 +97,9 @@ impl Simulation<'_> {
     /// Lets the constants of some elements change evenly to those of `law`, the law that the tissue has, over `seconds`
     /// from now on; zero: at once. Densities stay. These elements become tissues of their own at once, for which the
     /// scene is built anew; then constants change in 20 stages, each at the begin of a call of [`Simulation::advance`],
-    /// so calls should be shorter than a stage. Where the state is reset, or put back to a time before it began, it ends where it is. A stage takes as long as some thirty exact steps; with steps that choose their
-    /// length, and the last one with long steps, as long as preparing the steps.
+    /// so calls should be shorter than a stage. Where the state is reset, or put back to a time before it began, it ends
+    /// where it is. A stage takes as long as some thirty exact steps; with steps that choose their length, and the last
+    /// one with long steps, as long as preparing the steps.
     pub fn ablate(&mut self, elements: &[u32], law: impl Into<AnyLaw>, seconds: f64) -> Result<(), SimulationError> {
         let (law, count) = (law.into(), self.tets.len());
         if !(seconds >= 0.0 && seconds.is_finite()) {

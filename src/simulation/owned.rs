@@ -378,8 +378,9 @@ impl<'w> Simulation<'w> {
     }
 
     /// The same, to be changed: reset, restored, started elsewhere. Steps go on from there, a network's after a new
-    /// lead-in; tissue that relaxes remembers nothing after a state of other elements, as before some were removed. Lengths that are chosen at [`Simulation::prepare`], those of long steps and the longest of
-    /// [`Method::Auto`], stay as they are.
+    /// lead-in; tissue that relaxes remembers nothing after a state of other elements, as before some were removed.
+    /// Lengths that are chosen at [`Simulation::prepare`], those of long steps and the longest of [`Method::Auto`], stay
+    /// as they are.
     pub const fn state_mut(&mut self) -> &mut VecState {
         &mut self.state
     }

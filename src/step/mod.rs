@@ -2,7 +2,7 @@
 //! fits), compute forces and next increments, enter them in the energy balance, and only then accept the step and move
 //! the state, or refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and
 //! what a method keeps of it: the next step is the same, to the bit, as if there had been none. Only inertia that a long
-//! step has computed for other pulls than before stays.
+//! step has computed for other pulls than before stays, and of fast pulls the bound begins anew (`pulls.rs`).
 
 mod cause;
 mod compensated;
