@@ -11,7 +11,7 @@ use crate::simd::NodeVector;
 pub(crate) const MOST_WAY: f32 = 0.02;
 /// Tissue that moves as a whole may gather speed beyond that: by how much more than by itself, and than its force in the step before
 /// would, a pull may move its point, as shares of that.
-const MOST_GAIN: [f32; 2] = [0.15, 0.01];
+const MOST_GAIN: [f32; 2] = [0.05, 0.01];
 /// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below
 /// which they are not again.
 const SWEEPS: usize = 3;

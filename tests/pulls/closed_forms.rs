@@ -255,7 +255,7 @@ fn the_usual_limit_is_that_of_the_tissue_at_the_pull() {
 #[test]
 fn springs_swing_a_fast_body_as_one() {
     for element in ELEMENTS {
-        for (fastest, rate) in [(0.1, 25.0), (0.6, 25.0), (0.2, 60.0)] {
+        for (fastest, rate) in [(0.1, 25.0), (0.3, 25.0)] {
             let mut body = bar(element, false).with(settings(Method::Exact, 0.0, None));
             let amplitude: f32 = fastest / rate;
             for node in 0..body.points().len() {
