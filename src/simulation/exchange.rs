@@ -227,17 +227,17 @@ impl Simulation<'_> {
         remembered: Option<Vec<NodeVector>>,
         undo: impl FnOnce(&mut Self),
     ) -> Result<(), SimulationError> {
-        let (state, prepared) = (self.state.clone(), self.prepared.take());
+        let (state, prepared, tables) = (self.state.clone(), self.prepared.take(), self.tables);
         if let Some(remembered) = remembered {
-            self.state.remember(remembered, self.scene.view().memory_checksum());
+            self.tables = self.scene.view().memory_checksum();
+            self.state.remember(remembered, self.tables);
         }
         let was_prepared = prepared.is_some();
         let answer = self.go_on_prepared(was_prepared);
         if answer.is_err() {
             undo(self);
-            (self.state, self.prepared) = (state, prepared);
+            (self.state, self.prepared, self.tables) = (state, prepared, tables);
         }
-        self.tables = self.scene.view().memory_checksum();
         answer
     }
 
