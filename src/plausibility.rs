@@ -16,6 +16,7 @@ use crate::loads::{Motion, NodalForce};
 use crate::material::{AnyLaw, Law, Laws, Material, Moduli, Tissue};
 use crate::mesh::faces;
 use crate::mlp::Recipe;
+use crate::points::within;
 use crate::pulls::Pulls;
 use crate::scene::SceneView;
 
@@ -33,8 +34,6 @@ const POISSON_RATIOS: RangeInclusive<f64> = 0.0..=0.499_99;
 const MOST_GRAVITY: f64 = 1e3;
 /// Share of the diagonal by which a node may jump in the first step.
 const MOST_JUMP: f64 = 0.05;
-/// Share of a tetrahedron by which a point on its face may be outside.
-const ROUNDED: f64 = 1e-6;
 /// Faces of elements with three held nodes that a support has at least, to be told from single nodes.
 const FACES_OF_A_SUPPORT: u32 = 4;
 
@@ -322,15 +321,11 @@ pub fn of_contact<M: ElementMaterial>(
     }
 }
 
-/// Whether a point is in a tetrahedron of positive volume, or on it.
+/// Whether a point is in a tetrahedron, or on it.
 fn is_in(point: [f32; 3], corners: [Option<&[f32; 3]>; 4]) -> bool {
     let [Some(a), Some(b), Some(c), Some(d)] = corners else { return false };
-    let [a, b, c, d] =
-        [a, b, c, d].map(|corner| DVec3::from(corner.map(f64::from)) - DVec3::from(point.map(f64::from)));
-    let volume = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
-    let parts = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
-    let all: f64 = parts.iter().sum();
-    parts.iter().all(|&part| part >= -ROUNDED * all)
+    let place = |point: [f32; 3]| DVec3::from(point.map(f64::from));
+    within([a, b, c, d].map(|corner| place(*corner)), place(point)).is_some()
 }
 
 /// Of a pull along a direction (zeros: along all) on nodes with these held axes.

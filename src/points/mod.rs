@@ -32,6 +32,7 @@ mod nearest;
 mod tree;
 
 use core::fmt;
+pub(crate) use nearest::within;
 
 use crate::mesh::{Mesh, MeshError};
 use crate::simd::NodeVector;

@@ -10,7 +10,7 @@ const INSIDE: f64 = 1e-6;
 pub(super) type Nearest = ([f64; 4], f64);
 
 /// Weights of a place within a tetrahedron, whose volume is not zero; None outside.
-pub(super) fn within(corners: [DVec3; 4], place: DVec3) -> Option<[f64; 4]> {
+pub(crate) fn within(corners: [DVec3; 4], place: DVec3) -> Option<[f64; 4]> {
     let weights = Barycentric::of(corners, place).weights();
     if !weights.into_iter().all(|weight| weight >= -INSIDE) {
         return None;
