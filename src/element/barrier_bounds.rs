@@ -63,6 +63,7 @@ struct CriticalBounds<'a, 'b> {
 impl Kernel for CriticalBounds<'_, '_> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]

@@ -115,6 +115,7 @@ pub struct CriticalBounds<'a, 'b, L, P = OwnPressure> {
 impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]

@@ -123,6 +123,7 @@ struct OfElements<'a, 'b> {
 impl Kernel for OfElements<'_, '_> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]
@@ -164,6 +165,7 @@ struct OfPatches<'a, 'b> {
 impl Kernel for OfPatches<'_, '_> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]

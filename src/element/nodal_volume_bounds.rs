@@ -106,6 +106,7 @@ struct OnePass<'a, 'b> {
 impl Kernel for OnePass<'_, '_> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]

@@ -33,6 +33,7 @@ pub struct PatchBounds<'a, 'b, L> {
 impl<L: Law> Kernel for PatchBounds<'_, '_, L> {
     type Output = ();
 
+    const SELDOM: bool = true;
     const SCALAR: bool = true;
 
     #[inline(always)]

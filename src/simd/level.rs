@@ -41,6 +41,8 @@ pub trait Kernel {
     const SCALAR: bool = false;
     /// Whether vectors must have eight values or more.
     const EIGHT: bool = false;
+    /// Whether it runs seldom, as a look at the critical step: AVX2 will do where there is AVX-512, which saves its bytes.
+    const SELDOM: bool = false;
     /// The work, with vectors of this kind.
     fn run<R: Real>(self) -> Self::Output;
     /// The same as scalar code. Kernels whose batches differ in size then say so here: vectors are not compiled with
@@ -154,9 +156,9 @@ pub(super) fn at_current_level<K: Kernel>(kernel: K) -> K::Output {
     #[allow(unsafe_code)]
     match Level::current() {
         // SAFETY: a level is stored only after `Level::is_here` saw that processor and system support it.
-        Level::Avx512 => return unsafe { with_avx512(kernel) },
-        // SAFETY: as above.
-        Level::Avx2 => return unsafe { with_avx2(kernel) },
+        Level::Avx512 if !K::SELDOM => return unsafe { with_avx512(kernel) },
+        // SAFETY: as above; the features of AVX-512 that are asked for contain those of AVX2.
+        Level::Avx512 | Level::Avx2 => return unsafe { with_avx2(kernel) },
         _ => {}
     }
     #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
