@@ -1077,7 +1077,8 @@ typedef struct {
      */
     float added_mass;
     /**
-     * Long steps: most nodes that were held back in a step.
+     * Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, and have been
+     * for more than five steps.
      */
     uint32_t held_back;
     /**
@@ -1108,8 +1109,8 @@ typedef struct {
      */
     float stiffness;
     /**
-     * The most force, N, infinite for no limit; zero: three quarters of the shear modulus on a face of the cube of its
-     * nodes' volume. More tears the tissue.
+     * The most force, N, infinite for no limit; zero: half of the shear modulus on a face of the cube of its nodes' volume, a quarter
+     * for fewer than eight nodes. More tears the tissue.
      */
     float most;
     /**

@@ -50,6 +50,27 @@ pub struct Progress {
     pub(crate) second: bool,
     /// Steps keep it, and copies have it; a state that was restored, reset or put has none.
     pub(crate) seen: Option<Mark>,
+    /// What the latest exact steps held back of pulls.
+    pub(crate) pulls: HeldPulls,
+}
+
+/// Pulls whose force exact steps held back ([`crate::pulls`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct HeldPulls {
+    /// How many in the latest step.
+    pulls: u32,
+    /// In how many steps in a row there were any.
+    steps: u32,
+}
+
+impl HeldPulls {
+    const NONE: Self = Self { pulls: 0, steps: 0 };
+
+    /// Enters a step.
+    pub(crate) const fn enter(&mut self, pulls: u32) {
+        self.pulls = pulls;
+        self.steps = if pulls > 0 { self.steps.saturating_add(1) } else { 0 };
+    }
 }
 
 /// Left by the guard that follows a state ([`crate::guard`]) at the moment at which it has seen it last: a state with
@@ -99,7 +120,17 @@ impl Progress {
     #[must_use]
     pub const fn resumed(time: f64, steps: u64, last_step: f32, energy_balance: EnergyBalance) -> Self {
         let (half, extremes) = (0.5 * last_step, Extremes::REST);
-        Self { time, steps, energy_balance, dt: last_step, extremes, half, second: false, seen: None }
+        Self {
+            time,
+            steps,
+            energy_balance,
+            dt: last_step,
+            extremes,
+            half,
+            second: false,
+            seen: None,
+            pulls: HeldPulls::NONE,
+        }
     }
 
     /// Length of the step that the last increment spans, s; zero before the first step.
@@ -118,6 +149,14 @@ impl Progress {
     #[must_use]
     pub const fn steps(&self) -> u64 {
         self.steps
+    }
+
+    /// Pulls that the latest exact step held back, if more than five in a row did ([`crate::pulls`]): the motion is another then. A target
+    /// that jumps is followed sooner.
+    #[must_use]
+    pub const fn pulls_held_back(&self) -> u32 {
+        const LONG: u32 = 5;
+        if self.pulls.steps > LONG { self.pulls.pulls } else { 0 }
     }
 
     /// The energy balance.

@@ -206,6 +206,7 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let (status, Taken { exact, large, changes, .. }) =
             view.advance(span.seconds(), &mut work, open.view(), &mut loads.of_call, state.reborrow(), &threads);
         loads.enter(state.touches());
+        let status = status.at_end(&state);
         report.enter(&status, &state);
         report.steps = exact + large;
         report.close(&state);

@@ -69,7 +69,8 @@ pub struct supple_report {
     pub outside: f32,
     /// Long steps: mean over the nodes of the inertia added, in masses of the node.
     pub added_mass: f32,
-    /// Long steps: most nodes that were held back in a step.
+    /// Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, and have been
+    /// for more than five steps.
     pub held_back: u32,
     /// Long steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
     /// remarked upon.
@@ -116,6 +117,7 @@ impl supple_report {
     pub(super) fn close(&mut self, progress: &Progress) {
         let EnergyBalance { kinetic, peak, .. } = *progress.energy_balance();
         (self.time, self.kinetic, self.available) = (progress.time(), kinetic, peak);
+        self.held_back = self.held_back.max(progress.pulls_held_back());
     }
 }
 
@@ -211,7 +213,7 @@ pub(super) fn take_steps(
             refused => return refused,
         }
     }
-    worst
+    worst.at_end(state)
 }
 
 /// A report of a call that takes steps.

@@ -17,7 +17,8 @@
 //! ```
 //! It is stable for any `k`, since `a >= b` and `a + b >= 1/2`, and damps by `(k c)^2 / 2` a step at most: of second order in its
 //! length. One pull is solved for after the other, and again, at most three times, where pulls share nodes. No pull moves its point by more than a fiftieth of the size
-//! of the tissue at its nodes in such a step, so that tissue is not torn before it can answer.
+//! of the tissue at its nodes in such a step, or by little more than in the step before, so that tissue is not torn before it can answer.
+//! A call at whose end one is held back so for long says that it is limited ([`crate::state::Progress::pulls_held_back`]).
 //!
 //! Long steps take the force half a step ahead of their start, at the velocity of the point, and raise inertia by twice
 //! the stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]); none is stiffer there than its most
@@ -223,9 +224,9 @@ impl Pull {
     }
 }
 
-/// The most force (N) of a pull on these nodes unless the host says otherwise: three quarters of the shear modulus on a face
-/// of the cube that has the volume of the nodes' own tissue, with the mean modulus there. Twice as much tears nodal strain where
-/// points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
+/// The most force (N) of a pull on these nodes unless the host says otherwise: half of the shear modulus on a face of the cube that has
+/// the volume of the nodes' own tissue, with the mean modulus there; of fewer than eight nodes a quarter. Half as much again tears nodal
+/// strain where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
 #[must_use]
 pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
     let is_sorted = nodes.is_sorted_by_key(|pulled| pulled.node);
@@ -242,9 +243,13 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
             stiffness += share * Moduli::of(&tissue.law).shear as f32;
         }
     }
-    // 3/4 G V^(2/3) with G V the sum.
-    if volume > 0.0 { 0.75 * stiffness / libm::cbrtf(volume) } else { f32::INFINITY }
+    let share = if nodes.len() < FEW { 0.25 } else { 0.5 };
+    // G V^(2/3) with G V the sum.
+    if volume > 0.0 { share * stiffness / libm::cbrtf(volume) } else { f32::INFINITY }
 }
+
+/// Nodes below which a pull tears sooner.
+const FEW: usize = 8;
 
 /// Whether a coordinate (m) or a weight is one.
 fn is_bounded(value: f32) -> bool {

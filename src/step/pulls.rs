@@ -10,8 +10,10 @@ use crate::simd::NodeVector;
 /// The most that a pull moves its point in an exact step, as a share of the size of a node's tissue.
 pub(crate) const MOST_WAY: f32 = 0.02;
 /// Tissue that moves as a whole may gather speed beyond that: by how much more than by itself, and than its force in the step before
-/// would, a pull may move its point, as shares of that.
-const MOST_GAIN: [f32; 2] = [0.05, 0.01];
+/// would, a pull may move its point, as shares of that. Half of it holds back every second frame of moving points (`supple-lab pulls`).
+const MOST_GAIN: [f32; 2] = [0.4, 0.1];
+/// A pull is held back where this share of its force and more is left out.
+const LEFT_OUT: f32 = 0.1;
 /// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below
 /// which they are not again.
 const SWEEPS: usize = 3;
@@ -30,17 +32,17 @@ struct Point {
 
 impl<M: ElementMaterial> Trial<'_, M> {
     /// Adds the forces of pulls ([`crate::pulls`]) in an exact step to the total forces; none moves its point by more than a share
-    /// `most_way` of the size of a node's tissue. Gives their work, J.
+    /// `most_way` of the size of a node's tissue. Gives their work, J, and how many that holds back.
     #[inline(never)]
-    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> f32 {
-        let Some(pulls) = self.loads.pulls() else { return 0.0 };
+    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> (f32, u32) {
+        let Some(pulls) = self.loads.pulls() else { return (0.0, 0) };
         let start = self.progress.time;
         let mut sweep = 0;
         for (force, _) in self.pulls.iter_mut().zip(pulls.pulls()).filter(|(_, pull)| !pull.acts()) {
             *force = NodeVector::ZERO;
         }
         loop {
-            let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
+            let (mut changed, mut all, mut work, mut held_back) = (0.0f32, 0.0f32, 0.0, 0);
             for (index, pull) in pulls.acting() {
                 // At first those of the step before.
                 let (kept, now) = (at(self.pulls, index), if sweep == 0 { Vec3::ZERO } else { at(self.pulls, index) });
@@ -48,10 +50,12 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 let [late, next, last] = point.shares(pull.stiffness);
                 let time = start + f64::from(late * step.seconds());
                 let gap = (pull.target(time) - pull.unmoved()) - (point.here + next * point.next - last * point.last);
-                let change = pull.force(gap, now, next * point.compliance) - now;
+                let wanted = pull.force(gap, now, next * point.compliance) - now;
                 let first = pulls.nodes_of(pull).first();
                 let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
-                let change = point.without_tearing(change, kept - now, most_way * most_way * most_way * volume);
+                let change = point.without_tearing(wanted, kept - now, most_way * most_way * most_way * volume);
+                let left_out = (wanted - change).length_squared();
+                held_back += u32::from(left_out > LEFT_OUT * LEFT_OUT * (now + wanted).length_squared());
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);
                 if sweep < SWEEPS && (sweep == 0 || change != Vec3::ZERO) {
@@ -60,7 +64,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             }
             // The last sweep only sums up what the pulls do.
             if sweep == SWEEPS || (sweep > 0 && changed <= SETTLED * all) {
-                return work;
+                return (work, held_back);
             }
             sweep += 1;
         }

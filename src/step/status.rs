@@ -3,6 +3,7 @@
 use super::{Cause, EnergyBalance};
 use crate::element::Extremes;
 use crate::material::J_FLOOR;
+use crate::state::Progress;
 
 /// What became of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +15,8 @@ pub enum Status {
     /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
     /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its
     /// tangent), or there is more kinetic energy than the energy balance explains ([`EnergyBalance`]). For a step with
-    /// scaled inertia also: much of the motion was held back ([`crate::inertia::Report`]).
+    /// scaled inertia also: much of the motion was held back ([`crate::inertia::Report`]). Of a call: pulls are held back for long at
+    /// its end ([`Progress::pulls_held_back`]).
     Limited {
         /// Smallest volume ratio of an element.
         least_volume_ratio: f32,
@@ -67,6 +69,14 @@ impl Status {
             return Self::Limited { least_volume_ratio, saturation, energy_excess };
         }
         Self::Ok
+    }
+
+    /// The status of a call whose steps say this and lead there: limited also if pulls are held back for long at its end.
+    pub(crate) fn at_end(self, progress: &Progress) -> Self {
+        if self == Self::Ok && progress.pulls_held_back() > 0 {
+            return Self::of_taken(&progress.extremes, &progress.energy_balance, true);
+        }
+        self
     }
 
     /// The status of two steps, this one and a `later`: the later, unless that is `Ok`, or `Inexact` after `Limited`. A

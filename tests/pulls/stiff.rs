@@ -45,8 +45,8 @@ fn no_stiffness_makes_a_step_diverge() {
             1e3 * worst
         );
         assert_eq!(refused, 0);
-        // Not a body that stands still: targets are 15 mm away on average.
-        assert!(worst < 0.002);
+        // Not a body that stands still: targets are 15 mm away on average, and some beyond what the most force reaches.
+        assert!(worst < 0.003);
     }
 }
 
@@ -86,7 +86,7 @@ fn points_follow_moving_targets_of_which_a_third_is_missing() {
         for &at in &rest {
             body.pull(at, 0.012, 300.0).unwrap();
         }
-        let (frame, mut sum, mut frames) = (1.0 / 60.0, 0.0, 0.0);
+        let (frame, mut sum, mut frames, mut limited) = (1.0 / 60.0, 0.0, 0.0, 0);
         for number in 0..120 {
             let end = f64::from(number + 1) * frame;
             let shift = [0.01 * (1.5 * end as f32).sin(), 0.0, 0.005 * (3.0 * end as f32).sin()];
@@ -95,7 +95,7 @@ fn points_follow_moving_targets_of_which_a_third_is_missing() {
                 pull.stiffness = if random.next() < 0.3 { 0.0 } else { 300.0 };
                 pull.move_to(target, end - frame, end);
             }
-            body.advance(frame).unwrap();
+            limited += u32::from(!body.advance(frame).unwrap().is_ok());
             if number > 30 {
                 let error = |pull: usize| {
                     let point = body.pulled(pull).unwrap().point;
@@ -105,7 +105,10 @@ fn points_follow_moving_targets_of_which_a_third_is_missing() {
                 frames += 1.0;
             }
         }
-        println!("{name}: {:.3} mm from where they are, of 7 mm of motion", 1e3 * sum / frames);
+        println!(
+            "{name}: {:.3} mm from where they are, of 7 mm of motion; {limited} frames limited",
+            1e3 * sum / frames
+        );
         assert!(sum / frames < 0.0007);
     }
 }

@@ -89,7 +89,7 @@ class Report:
     accepts for the mean, a fifth of the motion so far or the tolerance. `exact`, `long`, `learned` count the steps taken, `undone` those
     computed and not taken, or taken back; `shortest` and `longest` are their lengths (s). What "limited" is about:
     `least_volume_ratio` below 0.1, `saturation` of the exponential law above 1, `energy_excess` above 0 (kinetic energy beyond the balance,
-    a share), `held_back` nodes, `lattice_share` below 0.5. `available_energy`: the most that loads and supports ever gave (J).
+    a share), `held_back` nodes, of exact steps pulls, `lattice_share` below 0.5. `available_energy`: the most that loads and supports ever gave (J).
     `added_mass`: of long steps, mean inertia added, in masses of the node. `clipped`, `outside`: of learned steps, shares of the vertices.
     """
 
@@ -400,7 +400,7 @@ class Simulation:
         """Draws points of the tissue (m, at rest) to targets (m) from now on, each by the nodes within `radius` (m; 2.2 mean edges unless
         given, some 20 to 50 nodes), with `stiffness` (N/m, one
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
-        (three quarters of the shear modulus on a face of the cube of its nodes' volume unless given; more tears the tissue). With `along`, a direction for all or for
+        (half of the shear modulus on a face of the cube of its nodes' volume, a quarter for fewer than eight nodes, unless given; more tears the tissue). With `along`, a direction for all or for
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent. A point turns with
         the body whenever targets move, and before it settles."""
         radius = _PATCH * self.scene._edge if radius is None else radius

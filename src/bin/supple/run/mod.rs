@@ -187,6 +187,7 @@ impl<'a> Running<'a> {
     /// Takes down what a call came to.
     fn enter(&mut self, report: &Report) {
         let Self { simulation, outcome, .. } = self;
+        outcome.enter_end(simulation.state());
         let [shortest, longest] = report.seconds;
         if longest > 0.0 {
             outcome.steps = (outcome.steps.0.min(shortest), outcome.steps.1.max(longest));

@@ -27,13 +27,22 @@ pub(crate) struct Limits {
     pub(crate) least_volume_ratio: f32,
     pub(crate) saturation: f32,
     pub(crate) energy_excess: f32,
-    /// Steps for no other cause than motion that was held back.
+    /// Steps for no other cause than motion that was held back, of long steps or of pulls.
     pub(crate) held_back: u64,
 }
 
 impl Limits {
     const NONE: Self =
         Self { steps: 0, first_time: 0.0, least_volume_ratio: 1.0, saturation: 0.0, energy_excess: 0.0, held_back: 0 };
+
+    /// Enters a step that led to this time, s.
+    fn enter(&mut self, time: f64) -> &mut Self {
+        if self.steps == 0 {
+            self.first_time = time;
+        }
+        self.steps += 1;
+        self
+    }
 }
 
 /// What was known at a frame.
@@ -135,6 +144,13 @@ impl Outcome {
         self.frames.push(FrameTrace { time: state.time(), mean, largest, estimate });
     }
 
+    /// Takes down what a call ended with.
+    pub(crate) fn enter_end(&mut self, state: &VecState) {
+        if state.pulls_held_back() > 0 {
+            self.limits.enter(state.time()).held_back += 1;
+        }
+    }
+
     /// Takes down what a step said that led to `state`.
     pub(crate) fn enter(&mut self, status: Status, state: &StateView<'_>) {
         if status.is_taken() {
@@ -142,11 +158,7 @@ impl Outcome {
         }
         match status {
             Status::Limited { least_volume_ratio, saturation, energy_excess } => {
-                let limits = &mut self.limits;
-                if limits.steps == 0 {
-                    limits.first_time = state.time();
-                }
-                limits.steps += 1;
+                let limits = self.limits.enter(state.time());
                 limits.least_volume_ratio = limits.least_volume_ratio.min(least_volume_ratio);
                 limits.saturation = limits.saturation.max(saturation);
                 limits.energy_excess = limits.energy_excess.max(energy_excess);
