@@ -54,21 +54,21 @@ pub struct Progress {
     pub(crate) pulls: HeldPulls,
 }
 
-/// Pulls whose force exact steps held back ([`crate::pulls`]).
+/// Pulls whose force exact steps held back ([`crate::pulls`]). Counts stop at the most that fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HeldPulls {
     /// How many in the latest step.
-    pulls: u32,
+    pulls: u16,
     /// In how many steps in a row there were any.
-    steps: u32,
+    steps: u16,
 }
 
 impl HeldPulls {
     const NONE: Self = Self { pulls: 0, steps: 0 };
 
     /// Enters a step.
-    pub(crate) const fn enter(&mut self, pulls: u32) {
-        self.pulls = pulls;
+    pub(crate) fn enter(&mut self, pulls: u32) {
+        self.pulls = u16::try_from(pulls).unwrap_or(u16::MAX);
         self.steps = if pulls > 0 { self.steps.saturating_add(1) } else { 0 };
     }
 }
@@ -154,9 +154,9 @@ impl Progress {
     /// Pulls that the latest exact step held back, if more than five in a row did ([`crate::pulls`]): the motion is another then. A target
     /// that jumps is followed sooner.
     #[must_use]
-    pub const fn pulls_held_back(&self) -> u32 {
-        const LONG: u32 = 5;
-        if self.pulls.steps > LONG { self.pulls.pulls } else { 0 }
+    pub fn pulls_held_back(&self) -> u32 {
+        const LONG: u16 = 5;
+        if self.pulls.steps > LONG { self.pulls.pulls.into() } else { 0 }
     }
 
     /// The energy balance.
