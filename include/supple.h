@@ -1109,8 +1109,8 @@ typedef struct {
      */
     float stiffness;
     /**
-     * The most force, N, infinite for no limit; zero: half of the shear modulus on a face of the cube of its nodes' volume, a quarter
-     * for fewer than eight nodes. More tears the tissue.
+     * The most force, N, infinite for no limit; zero: 0.15 of the shear modulus on the area in which its nodes hang together with other
+     * tissue, half of that for fewer than eight nodes. More tears the tissue.
      */
     float most;
     /**

@@ -37,6 +37,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::element::ElementTile;
 use crate::loads::FARTHEST;
 use crate::material::{Material, Moduli};
 use crate::scene::SceneView;
@@ -224,9 +225,11 @@ impl Pull {
     }
 }
 
-/// The most force (N) of a pull on these nodes unless the host says otherwise: half of the shear modulus on a face of the cube that has
-/// the volume of the nodes' own tissue, with the mean modulus there; of fewer than eight nodes a quarter. Half as much again tears nodal
-/// strain where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
+/// The most force (N) of a pull on these nodes unless the host says otherwise: 0.15 of the shear modulus on the area in which they hang
+/// together with other tissue, at most three quarters of it on a face of the cube that has the volume of the nodes' own tissue; half as
+/// much for fewer than eight nodes. The area is the sum over the elements that have both nodes of the pull and others, of the volume times
+/// the gradient between them: a patch at a thin edge hangs on less of it than its volume tells. Half as much again tears nodal strain
+/// there where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
 #[must_use]
 pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
     let is_sorted = nodes.is_sorted_by_key(|pulled| pulled.node);
@@ -234,18 +237,35 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
         true => nodes.binary_search_by_key(&node, |pulled| pulled.node).is_ok(),
         false => nodes.iter().any(|pulled| pulled.node == node),
     };
-    let (mut volume, mut stiffness) = (0.0_f32, 0.0_f32);
+    // m^3, N m, N
+    let (mut volume, mut stiffness, mut across) = (0.0_f32, 0.0_f32, 0.0_f32);
     for (tile, lane) in scene.places() {
-        let corners = (0..4).filter(|&corner| is_pulled(tile.node(corner, lane) as u32)).count();
+        let inside = [0, 1, 2, 3].map(|corner| is_pulled(tile.node(corner, lane) as u32));
+        let corners = inside.into_iter().filter(|inside| *inside).count();
         if let Some(tissue) = scene.material.tissue(tile.element(lane)).filter(|_| corners > 0) {
-            let share = 0.25 * corners as f32 * tile.volume::<f32>(lane);
+            let (own, shear) = (tile.volume::<f32>(lane), Moduli::of(&tissue.law).shear as f32);
+            let share = 0.25 * corners as f32 * own;
             volume += share;
-            stiffness += share * Moduli::of(&tissue.law).shear as f32;
+            stiffness += share * shear;
+            across += shear * own * gradient_of_share(tile, lane, inside).length();
         }
     }
-    let share = if nodes.len() < FEW { 0.25 } else { 0.5 };
     // G V^(2/3) with G V the sum.
-    if volume > 0.0 { share * stiffness / libm::cbrtf(volume) } else { f32::INFINITY }
+    let of_volume = if volume > 0.0 { 0.75 * stiffness / libm::cbrtf(volume) } else { f32::INFINITY };
+    let of_area = if across > 0.0 { 0.15 * across } else { f32::INFINITY };
+    if nodes.len() < FEW { 0.5 * of_volume.min(of_area) } else { of_volume.min(of_area) }
+}
+
+/// The gradient (1/m) of what is one at some corners of an element and zero at the others.
+fn gradient_of_share(tile: &ElementTile, lane: usize, inside: [bool; 4]) -> Vec3 {
+    let [first, others @ ..] = inside;
+    // The gradients of the four shape functions sum up to zero.
+    let of = |(corner, inside): (usize, bool)| match (first, inside) {
+        (false, true) => Vec3::from_array([0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane))),
+        (true, false) => -Vec3::from_array([0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane))),
+        _ => Vec3::ZERO,
+    };
+    others.into_iter().enumerate().map(of).sum()
 }
 
 /// Nodes below which a pull tears sooner.

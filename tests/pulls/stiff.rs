@@ -46,7 +46,7 @@ fn no_stiffness_makes_a_step_diverge() {
         );
         assert_eq!(refused, 0);
         // Not a body that stands still: targets are 15 mm away on average, and some beyond what the most force reaches.
-        assert!(worst < 0.003);
+        assert!(worst < 0.0025);
     }
 }
 
