@@ -143,6 +143,7 @@ pub mod element;
 mod energy_balance;
 pub mod guard;
 mod heap_sort;
+mod held_pulls;
 pub mod image;
 pub mod inertia;
 pub mod learned;

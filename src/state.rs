@@ -15,6 +15,7 @@ use crate::contact::{MOST_INSTRUMENTS, Surface, vectors_to_push};
 use crate::copy::copy;
 use crate::element::{Extremes, forget_crushed};
 use crate::energy_balance::EnergyBalance;
+use crate::held_pulls::HeldPulls;
 use crate::material::Element;
 #[cfg(any(feature = "std", test))]
 use crate::material::Material;
@@ -52,25 +53,6 @@ pub struct Progress {
     pub(crate) seen: Option<Mark>,
     /// What the latest exact steps held back of pulls.
     pub(crate) pulls: HeldPulls,
-}
-
-/// Pulls whose force exact steps held back ([`crate::pulls`]). Counts stop at the most that fits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct HeldPulls {
-    /// How many in the latest step.
-    pulls: u16,
-    /// In how many steps in a row there were any.
-    steps: u16,
-}
-
-impl HeldPulls {
-    const NONE: Self = Self { pulls: 0, steps: 0 };
-
-    /// Enters a step.
-    pub(crate) fn enter(&mut self, pulls: u32) {
-        self.pulls = u16::try_from(pulls).unwrap_or(u16::MAX);
-        self.steps = if pulls > 0 { self.steps.saturating_add(1) } else { 0 };
-    }
 }
 
 /// Left by the guard that follows a state ([`crate::guard`]) at the moment at which it has seen it last: a state with
@@ -154,9 +136,8 @@ impl Progress {
     /// Pulls that the latest exact step held back, if more than five in a row did ([`crate::pulls`]): the motion is another then. A target
     /// that jumps is followed sooner.
     #[must_use]
-    pub fn pulls_held_back(&self) -> u32 {
-        const LONG: u16 = 5;
-        if self.pulls.steps > LONG { self.pulls.pulls.into() } else { 0 }
+    pub const fn pulls_held_back(&self) -> u32 {
+        self.pulls.for_long()
     }
 
     /// The energy balance.

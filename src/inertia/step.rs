@@ -171,7 +171,6 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, T> {
         let LargeModel { lattice, renewal, report, nodes, moment, loads, owed, calms, has_stepped, .. } = &mut **model;
         (*moment, *loads, *owed) = (trial.progress.moment(), trial.loads.mark(), self.owed);
         (*calms, *has_stepped) = (false, true);
-        trial.progress.pulls.enter(0);
         renewal.enter(storage.room.part, lattice, &storage.matrices.frames);
         *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE

@@ -16,8 +16,9 @@
 //! t = k c / (1 + k c),   c = s sum w^2 / m,   s the step's factor of force over mass
 //! ```
 //! It is stable for any `k`, since `a >= b` and `a + b >= 1/2`, and damps by `(k c)^2 / 2` a step at most: of second order in its
-//! length. One pull is solved for after the other, and again, at most three times, where pulls share nodes. No pull moves its point by more than a fiftieth of the size
-//! of the tissue at its nodes in such a step, or by little more than in the step before, so that tissue is not torn before it can answer.
+//! length. One pull is solved for after the other, and again, at most three times, where pulls share nodes. No pull moves its point by
+//! more than a fiftieth of the size of the tissue at its nodes in such a step, or by little more than in the step before, so that tissue
+//! is not torn before it can answer.
 //! A call at whose end one is held back so for long says that it is limited ([`crate::state::Progress::pulls_held_back`]).
 //!
 //! Long steps take the force half a step ahead of their start, at the velocity of the point, and raise inertia by twice
@@ -258,13 +259,8 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
 
 /// The gradient (1/m) of what is one at some corners of an element and zero at the others.
 fn gradient_of_share(tile: &ElementTile, lane: usize, inside: [bool; 4]) -> Vec3 {
-    let [first, others @ ..] = inside;
-    // The gradients of the four shape functions sum up to zero.
-    let of = |(corner, inside): (usize, bool)| match (first, inside) {
-        (false, true) => Vec3::from_array([0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane))),
-        (true, false) => -Vec3::from_array([0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane))),
-        _ => Vec3::ZERO,
-    };
+    let [first, others @ ..] = inside.map(|inside| if inside { 1.0_f32 } else { 0.0 });
+    let of = |(corner, share)| (share - first) * Vec3::from_array(tile.gradients(corner, lane));
     others.into_iter().enumerate().map(of).sum()
 }
 

@@ -67,6 +67,8 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) touched: usize,
     /// Forces of the pulls, N.
     pub(crate) pulls: &'a mut [NodeVector],
+    /// How many of them an exact step holds back.
+    pub(crate) held_pulls: u32,
     /// What tissue remembers, see [`StateView`], and the halves of the last step and of this one through which it
     /// relaxes, s.
     pub(crate) memory: &'a mut [NodeVector],
@@ -176,6 +178,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             pushes,
             touched: 0,
             pulls,
+            held_pulls: 0,
             memory,
             halves: [0.0; 2],
             refused: None,
@@ -249,6 +252,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         (self.progress.half, self.progress.second) = (self.halves[1], !self.progress.second);
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;
+        self.progress.pulls.enter(self.held_pulls);
         if self.scene.element().is_nodal_strain() {
             mark_moment(self.volume, &self.progress.moment());
         }

@@ -32,17 +32,18 @@ struct Point {
 
 impl<M: ElementMaterial> Trial<'_, M> {
     /// Adds the forces of pulls ([`crate::pulls`]) in an exact step to the total forces; none moves its point by more than a share
-    /// `most_way` of the size of a node's tissue. Gives their work, J, and how many that holds back.
+    /// `most_way` of the size of a node's tissue. Gives their work, J.
     #[inline(never)]
-    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> (f32, u32) {
-        let Some(pulls) = self.loads.pulls() else { return (0.0, 0) };
+    pub(crate) fn pull(&mut self, step: &Step, method: &impl StepMethod<M>, most_way: f32) -> f32 {
+        let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let start = self.progress.time;
         let mut sweep = 0;
         for (force, _) in self.pulls.iter_mut().zip(pulls.pulls()).filter(|(_, pull)| !pull.acts()) {
             *force = NodeVector::ZERO;
         }
         loop {
-            let (mut changed, mut all, mut work, mut held_back) = (0.0f32, 0.0f32, 0.0, 0);
+            let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
+            self.held_pulls = 0;
             for (index, pull) in pulls.acting() {
                 // At first those of the step before.
                 let (kept, now) = (at(self.pulls, index), if sweep == 0 { Vec3::ZERO } else { at(self.pulls, index) });
@@ -55,7 +56,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 let volume = first.map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
                 let change = point.without_tearing(wanted, kept - now, most_way * most_way * most_way * volume);
                 let left_out = (wanted - change).length_squared();
-                held_back += u32::from(left_out > LEFT_OUT * LEFT_OUT * (now + wanted).length_squared());
+                self.held_pulls += u32::from(left_out > LEFT_OUT * LEFT_OUT * (now + wanted).length_squared());
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);
                 if sweep < SWEEPS && (sweep == 0 || change != Vec3::ZERO) {
@@ -64,7 +65,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             }
             // The last sweep only sums up what the pulls do.
             if sweep == SWEEPS || (sweep > 0 && changed <= SETTLED * all) {
-                return (work, held_back);
+                return work;
             }
             sweep += 1;
         }

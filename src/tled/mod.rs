@@ -67,7 +67,7 @@ pub fn step_in_parts<M: ElementMaterial>(
 ) -> Status {
     let step = step.following(state.dt);
     match Trial::begin(scene, loads, state, usize::MAX) {
-        Ok(trial) => trial.take(&step, &mut Exact { step: &step, threads, held_back: 0 }),
+        Ok(trial) => trial.take(&step, &mut Exact { step: &step, threads }),
         Err(refused) => refused,
     }
 }
@@ -75,8 +75,6 @@ pub fn step_in_parts<M: ElementMaterial>(
 struct Exact<'a, T> {
     step: &'a Step,
     threads: &'a T,
-    /// Pulls that the step holds back.
-    held_back: u32,
 }
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
@@ -98,8 +96,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], after, self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
         if is_pulled {
-            let (work, held_back) = trial.pull(step, self, MOST_WAY);
-            self.held_back = held_back;
+            let work = trial.pull(step, self, MOST_WAY);
             let all = 0..trial.scene.node_count();
             totals = total(all, trial.increment, trial.force);
             totals.add_work(work);
@@ -134,11 +131,6 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
             let force = force.get(nodes).unwrap_or_default();
             Advance { step, inertia, moving, force }.advance();
         });
-    }
-
-    fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
-        trial.progress.pulls.enter(self.held_back);
-        false
     }
 }
 

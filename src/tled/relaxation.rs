@@ -110,7 +110,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
         let sums_of = |nodes, force: &[NodeVector], _: &mut [()]| own.sums(nodes, inertia, increment, force);
         let (sums, extremes) = forcing.in_parts(volume, force, &mut [], after, self.threads, sums_of);
         let mut totals = Totals::of_all(&sums);
-        totals.add_work(trial.pull(self.step, self, MOST_WAY).0);
+        totals.add_work(trial.pull(self.step, self, MOST_WAY));
         if trial.loads.pulls().is_some() {
             let Trial { increment, force, .. } = &*trial;
             totals.replace_sums(&own.sums(0..inertia.len(), inertia, increment, force));
