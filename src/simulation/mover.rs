@@ -141,7 +141,7 @@ impl Mover<'_, '_> {
         if call.work.is_spent() && call.report.status.is_taken() && missing > ROUNDING * span {
             call.report.enter(Status::Behind { seconds: missing });
         }
-        call.report.enter(Status::Ok.at_end(state.progress));
+        call.report.status = call.report.status.at_end(state.progress);
         Ok(Report { time: state.time(), ..call.report })
     }
 }

@@ -2,6 +2,7 @@
 //! their longest: a pull, and an instrument. Exact steps of a fifth of the critical one move it as those of nine tenths.
 
 use supple::contact::{Instrument, Pose, Shape};
+use supple::loads::NodalForce;
 use supple::material::Element;
 use supple::simulation::{Method, Simulation};
 use supple::step::Status;
@@ -93,4 +94,26 @@ fn a_pull_that_is_held_back_is_told() {
         assert_eq!(limited > 0, told);
         assert!(limited < 20);
     }
+}
+
+/// What a call ends with hides no refusal, and is forgotten once other steps were taken.
+#[test]
+fn a_held_pull_hides_no_refusal() {
+    let held = || {
+        let mut body = bar(Element::NodalStrain, false).with(settings(Method::Exact, 20.0, None));
+        let at = [0.015, 0.015, BAR.size[2]];
+        let pull = body.pull(at, 0.03, 1e4).unwrap();
+        body.pulls[pull].most = f32::INFINITY;
+        body.pulls[pull].move_to([at[0] + 0.03, at[1], at[2]], 0.0, 1.0 / 60.0);
+        assert!(matches!(body.advance(1.0 / 60.0).unwrap().status, Status::Limited { .. }));
+        assert_eq!(body.state().pulls_held_back(), 1);
+        body
+    };
+    let mut refused = held();
+    refused.forces = vec![NodalForce { node: 0, newton: [1e30, 0.0, 0.0], ramp: 0.0 }];
+    println!("{}", refused.advance(1.0 / 60.0).unwrap_err());
+
+    let mut settled = held();
+    assert!(settled.settle(1e-4, 5000).unwrap().at_rest);
+    assert_eq!(settled.state().pulls_held_back(), 0);
 }
