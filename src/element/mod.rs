@@ -62,8 +62,8 @@ pub(crate) use barrier_bounds::{CrushedTangents, add_crushed_bounds, each_bounde
 pub(crate) use barrier_forces::{AddCrushed, Forces as CrushedForces};
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
 pub(crate) use crushed::{
-    CrushedElements, LOOK_CYCLE, LOOK_CYCLE_OF_LONG, Look, MARKED, each_marked, forget_crushed, is_marked_at,
-    mark_moment, mask_of, masks, masks_mut,
+    CrushedElements, LOOK_CYCLE, LOOK_CYCLE_OF_LONG, Look, MARKED, Marks, Seen, Turn, each_marked, farthest,
+    forget_crushed, is_marked_at, mark_moment, mask_of, masks,
 };
 #[cfg(feature = "std")]
 pub(crate) use extension::place_in;

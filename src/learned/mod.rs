@@ -566,9 +566,7 @@ fn is_wild<M: ElementMaterial>(scene: SceneView<'_, M>, state: &StateView<'_>) -
         let most = MOST_OF_SIZE * MOST_OF_SIZE * MOST_OF_SIZE * volume;
         square * square * square > most * most
     });
-    let (tiles, displacement) = (scene.tiles, &*state.displacement);
-    let look = Look { tiles, displacement, below: 0.0, first: 0, cycle: 1, with_marked: false, masks: &mut [] };
-    let least = 1.0 + look.least_change();
+    let least = 1.0 + Look::at_all(scene.tiles, state.displacement, 0.0, &mut []).see().least_change;
     let limited = Status::Limited { least_volume_ratio: least, saturation: 0.0, energy_excess: 0.0 };
     (leaps || least <= 0.0).then_some(limited)
 }

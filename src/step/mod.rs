@@ -73,6 +73,8 @@ pub(crate) struct Trial<'a, M> {
     /// relaxes, s.
     pub(crate) memory: &'a mut [NodeVector],
     pub(crate) halves: [f32; 2],
+    /// The step over the last one.
+    pub(crate) pace: f32,
     /// The node and the instrument that the step must not be taken with.
     pub(crate) refused: Option<(u32, Cause)>,
 }
@@ -181,6 +183,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             held_pulls: 0,
             memory,
             halves: [0.0; 2],
+            pace: 1.0,
             refused: None,
         })
     }
@@ -223,6 +226,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             }
             self.halves = if C::IS_RELAXED { [f32::INFINITY, 0.0] } else { [self.progress.half, 0.5 * step.seconds()] };
         }
+        let pace = step.seconds() / self.progress.dt;
+        self.pace = if pace.is_finite() { pace } else { 1.0 };
         let before = self.progress.energy_balance;
         let heat = match self.progress.steps % heat::EVERY {
             0 => heat::of_rounding(step, self.scene.inertia, self.displacement),

@@ -6,9 +6,9 @@ use core::ops::Range;
 
 use crate::element::{
     AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extended, Extremes, Fibrous, ForcesVisitor,
-    InternalForces, LOOK_CYCLE, Look, MARKED, MaybeBound, MeanPressure, NoExtension, NodalVolumes, NodeInertia,
-    OwnPressure, PatchForces, Relaxing, Series, each_marked, extended_forces, extended_nodal_pressure_forces,
-    extended_patch_forces, is_marked_at, mask_of, masks, masks_mut,
+    InternalForces, Look, MARKED, Marks, MaybeBound, MeanPressure, NoExtension, NodalVolumes, NodeInertia, OwnPressure,
+    PatchForces, Relaxing, Seen, Series, Turn, each_marked, extended_forces, extended_nodal_pressure_forces,
+    extended_patch_forces, farthest, is_marked_at, mask_of, masks,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::material::Material;
@@ -19,6 +19,9 @@ use crate::state::{Progress, copies_of};
 
 use super::Trial;
 use super::threads::{Threads, take};
+
+/// All tiles are looked at within at most so many steps where threads share the work.
+const FEW_STEPS: u8 = 4;
 
 /// The input of the total forces.
 pub(crate) struct Forcing<'a, M, V> {
@@ -35,19 +38,35 @@ pub(crate) struct Forcing<'a, M, V> {
     /// How tissue relaxes, if it does, and what it remembers.
     pub(crate) series: Option<Series<'a>>,
     pub(crate) before: &'a [NodeVector],
+    /// The latest increments, m, and this step over that of them.
+    pub(crate) increment: &'a [NodeVector],
+    pub(crate) pace: f32,
     /// Steps of this kind in which every element is looked at where some may be crushed ([`crate::element`]).
-    pub(crate) look_cycle: usize,
+    pub(crate) look_cycle: u8,
 }
 
 impl<M: Material> Trial<'_, M> {
     /// The input of the total forces, the latest increments, and where to write volumes and forces.
-    pub(crate) fn forcing<V>(&mut self, visitor: V, look_cycle: usize) -> TotalForces<'_, M, V> {
+    pub(crate) fn forcing<V>(&mut self, visitor: V, look_cycle: u8) -> TotalForces<'_, M, V> {
         let Self { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = self;
         let (scene, is_heated) = (*scene, *is_heated);
         let series = scene.series(self.halves, progress.steps);
         let [before, after] = copies_of(self.memory, progress);
-        let forcing =
-            Forcing { scene, visitor, displacement, remainder, is_heated, loads, progress, series, before, look_cycle };
+        let (increment, pace) = (&**increment, self.pace);
+        let forcing = Forcing {
+            scene,
+            visitor,
+            displacement,
+            remainder,
+            is_heated,
+            loads,
+            progress,
+            series,
+            before,
+            increment,
+            pace,
+            look_cycle,
+        };
         TotalForces { forcing, increment, volume, force, after }
     }
 }
@@ -147,19 +166,27 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
 
     /// Looks which elements with nodal strain are crushed: at those whose turn it is, or at all if the marks of the
     /// state are not of this moment. Gives the least `J - 1` of those that were looked at.
-    fn look(&self, marks: &mut [NodeVector], threads: &impl Threads) -> f32 {
+    fn look(&self, vectors: &mut [NodeVector], threads: &impl Threads) -> f32 {
         if !self.scene.element().is_nodal_strain() {
             return f32::INFINITY;
         }
-        let cycle = if is_marked_at(marks, &self.progress.moment()) { self.look_cycle.max(1) } else { 1 };
-        let first = (self.progress.steps % cycle as u64) as usize;
-        if cycle < LOOK_CYCLE {
-            return look_in_turn(self.scene, self.displacement, marks, [first, cycle], threads);
+        let (is_marked, step) = (is_marked_at(vectors, &self.progress.moment()), self.progress.steps);
+        let marks = Marks::of(vectors, self.scene.tiles.len());
+        let mut hurry = marks.hurry.at(step, self.look_cycle);
+        let is_much_faster = hurry.is_much_faster(self.pace * farthest(self.increment), || self.scene.edge());
+        let whole = is_much_faster || !is_marked;
+        let turn =
+            Turn { now: step as u8, whole, within: hurry.within, cycle: self.look_cycle, pace: self.pace, first: 0 };
+        let moved = [self.displacement, self.increment];
+        let seen = look(self.scene, moved, turn, marks, threads);
+        let is_fast = hurry.enter(seen.rate, step);
+        hurry.keep(vectors);
+        if is_fast {
+            for turn in Marks::of(vectors, self.scene.tiles.len()).turns {
+                *turn = (step as u8).wrapping_add(turn.wrapping_sub(step as u8).min(hurry.within));
+            }
         }
-        // Too little for threads.
-        let (tiles, masks) = (self.scene.tiles, masks_mut(marks, self.scene.tiles.len()));
-        let displacement = self.displacement;
-        Look { tiles, displacement, below: MARKED, first, cycle, with_marked: false, masks }.least_change()
+        seen.least_change
     }
 
     fn compute<T, F>(
@@ -197,36 +224,37 @@ pub(crate) fn write_volumes<M: ElementMaterial>(
 ) {
     nodal_volumes(scene, displacement, &[], volumes, threads);
     if scene.element().is_nodal_strain() {
-        look_in_turn(scene, displacement, volumes, [0, 1], threads);
+        let marks = Marks::of(volumes, scene.tiles.len());
+        look(scene, [displacement, &[]], Turn::ALL, marks, threads);
     }
 }
 
-/// Looks which elements are crushed, at one tile in so many, from a first one on, and at those that have marks. Gives the
-/// least `J - 1`.
-fn look_in_turn<M: ElementMaterial>(
+/// Looks which elements are crushed, at the tiles whose turn it is, and writes their marks.
+fn look<M: ElementMaterial>(
     scene: SceneView<'_, M>,
-    displacement: &[NodeVector],
-    marks: &mut [NodeVector],
-    [first, cycle]: [usize; 2],
+    [displacement, increment]: [&[NodeVector]; 2],
+    turn: Turn,
+    marks: Marks<'_>,
     threads: &impl Threads,
-) -> f32 {
-    // Seen not to be zero.
-    let (partitions, cycle) = (scene.elements().partitions, cycle.max(1));
-    let count = partitions.parts(threads.parts());
-    let (mut tiles, mut masks) = (scene.tiles, masks_mut(marks, scene.tiles.len()));
+) -> Seen<f32> {
+    let Marks { mut masks, mut turns, .. } = marks;
+    let partitions = scene.elements().partitions;
+    // Of a few tiles there is too little for threads.
+    let count = partitions.parts(if turn.whole || turn.within <= FEW_STEPS { threads.parts() } else { 1 });
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
         let own = partitions.tiles_of(&partitions.part(part, count));
-        // The first tile of the part whose turn it is.
-        let first = (first + cycle - own.start % cycle) % cycle;
-        let part = tiles.split_off(..own.len().min(tiles.len())).unwrap_or_default();
-        (part, take(&mut masks, own.len()), first, f32::INFINITY)
+        let (masks, turns) = (take(&mut masks, own.len()), take(&mut turns, own.len()));
+        (own, masks, turns, Seen::nothing())
     });
-    let parts = parts.get_mut(..count).unwrap_or_default();
-    threads.each(parts, |(tiles, masks, first, least)| {
-        let (first, with_marked) = (*first, cycle > 1);
-        *least = Look { tiles, displacement, below: MARKED, first, cycle, with_marked, masks }.least_change();
-    });
-    parts.iter().fold(f32::INFINITY, |least, (.., of_part)| least.min(*of_part))
+    let see = |(own, masks, turns, seen): &mut (Range<usize>, &mut [u16], &mut [u8], Seen<f32>)| {
+        let (turn, tiles) = (Turn { first: own.start, ..turn }, scene.tiles.get(own.clone()).unwrap_or_default());
+        *seen = Look { tiles, displacement, increment, below: MARKED, turn, masks, turns }.see();
+    };
+    match parts.get_mut(..count).unwrap_or_default() {
+        [one] => see(one),
+        several => threads.each(several, see),
+    }
+    parts.iter().fold(Seen::nothing(), |sum, (.., seen)| sum.merged_with(*seen))
 }
 
 /// Adds the forces of crushed elements to the nodes in `partitions`, from the marks of the state. Gives their least
