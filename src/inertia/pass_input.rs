@@ -52,8 +52,9 @@ impl ResidualFactors {
             let span = due.min(LONGEST_SPAN);
             (span, step.seconds() * (due - span))
         };
-        let square = step.seconds() * step.seconds() * span;
-        Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry(), owed }
+        // Damping acts as long as forces do, so that a steady fall stays one where steps change.
+        let (square, loss) = (step.seconds() * step.seconds(), 2.0 * k * step.carry());
+        Self { square: ratio * span * square, loss: ratio * span * loss, owed }
     }
 
     /// The time (s) for which forces have yet to act after the step ([`LargeModel::owed`]).
