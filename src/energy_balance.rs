@@ -135,7 +135,9 @@ impl EnergyBalance {
         let uncertainty = self.uncertainty + jump + ROUNDING * work.abs();
         let cycle = EnergyCycle { work: self.cycle.work + work.abs() + jump, ..self.cycle };
         let (work, dissipated) = (self.work + work, self.dissipated + dissipated);
-        let entered = Self { work, dissipated, kinetic, uncertainty, cycle, ..self };
+        let mut entered = Self { work, dissipated, kinetic, uncertainty, cycle, ..self };
+        // No body has less than no energy: where a longer step begins, loads may have taken what added inertia has.
+        entered.corrected -= entered.balance().min(0.0);
         // Dissipation of this step is left out: it belongs to the time after t_n.
         let balance = entered.balance() + (dissipated - self.dissipated);
         Self { peak: if balance > self.peak { balance } else { self.peak }, ..entered }
