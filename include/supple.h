@@ -398,8 +398,9 @@ enum supple_status
      */
     SUPPLE_E_CHOICE = -7,
     /**
-     * Objects for scenes with other numbers of nodes (value, limit), or a saved state of tissue that remembers other
-     * bytes (value) than that of the state (limit).
+     * Objects for scenes with other numbers of nodes, or lists of another length (value, limit); or a saved state of tissue that
+     * remembers other bytes (value) than that of the state (limit); or tissue `index` is to have another density (value,
+     * kg/m^3) than it has (limit).
      */
     SUPPLE_E_MISMATCH = -8,
     /**
@@ -412,12 +413,12 @@ enum supple_status
      */
     SUPPLE_E_INDEX = -10,
     /**
-     * Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of a pressed point beyond 1e6 m.
+     * Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of the mesh beyond 1e6 m.
      */
     SUPPLE_E_NOT_FINITE = -11,
     /**
-     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s); or a
-     * tolerance (m); or a span of supple_sim_advance (s), which must be above zero.
+     * Entry `index` has a ramp (value, s) that is negative or not finite; or a span of supple_sim_advance (s), which must be
+     * above zero; or as axis tells a tolerance (0; m), a damping (1; 1/s), a lead-in or a time of targets (2; s).
      */
     SUPPLE_E_NEGATIVE = -12,
     /**
@@ -455,7 +456,7 @@ enum supple_status
      */
     SUPPLE_E_MESH_INVERTED = -23,
     /**
-     * `node` belongs to no element.
+     * `node` belongs to no element; with index: it is a corner of that triangle of a contact.
      */
     SUPPLE_E_MESH_UNUSED_NODE = -24,
     /**
@@ -503,7 +504,8 @@ enum supple_status
      */
     SUPPLE_E_FIELD = -35,
     /**
-     * Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, or no nodes.
+     * Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, no nodes, or weights
+     * whose sum (value) is not one (limit).
      */
     SUPPLE_E_PULL = -36,
     /**
@@ -642,7 +644,7 @@ enum supple_status
      */
     SUPPLE_E_DIVERGED_PRESSURE = -98,
     /**
-     * Surface `index` is to be filled, but is open: it has no volume.
+     * Surface `index` is to be filled, but is open or has no triangles: it has no volume.
      */
     SUPPLE_E_OPEN_SURFACE = -99,
 };
@@ -731,7 +733,7 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * Held axes: 1 for x, 2 for y, 4 for z, or their sum; 7 for all.
+     * Held axes, at least one: 1 for x, 2 for y, 4 for z, or their sum; 7 for all.
      */
     uint32_t axes;
     /**
@@ -894,7 +896,7 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these.
+     * 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these; or as the status says.
      */
     uint32_t axis;
     /**
@@ -961,7 +963,7 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * Axes that follow: 1 for x, 2 for y, 4 for z, or their sum.
+     * Axes that follow, at least one: 1 for x, 2 for y, 4 for z, or their sum.
      */
     uint32_t axes;
     /**
@@ -1592,7 +1594,8 @@ typedef struct {
     /**
      * Length of the steps, s; 0: chosen. Of long steps at most so much, 20 critical steps unless given; of exact
      * ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
-     * the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+     * the critical step falls while they are taken: above the critical step of the state as it is they are refused
+     * (SUPPLE_E_UNSTABLE); of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
      */
     float seconds;
     /**
@@ -2020,12 +2023,12 @@ size_t supple_pressure_size(uint32_t triangles,
 /**
  * Prepares pressures, zero yet, in `memory` of at least supple_pressure_size bytes, aligned to SUPPLE_ALIGN.
  *
- * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
  * @param triangles three nodes of each of `count` triangles, as of supple_boundary: seen from outside of the tissue
  * counter-clockwise.
  * @param surface_of the surface of each triangle, from zero; NULL: all are of surface 0.
  * @param surfaces how many there are, each with a pressure of its own.
- * @param error may be NULL; index is that of a triangle.
+ * @param error may be NULL; index is that of a triangle, of SUPPLE_E_POINTS that of an element.
  */
 supple_status supple_pressure_init(void *memory,
                                    size_t bytes,
@@ -2053,7 +2056,7 @@ supple_status supple_pressure_set(supple_pressure *pressure,
  * Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
  * within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
  * the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps. A surface that
- * is open is refused (SUPPLE_E_OPEN_SURFACE).
+ * is open or has no triangles is refused (SUPPLE_E_OPEN_SURFACE).
  *
  * @param cubic_metres m^3, above zero.
  * @param bulk Pa; 0: the volume is not asked for.
@@ -2073,8 +2076,9 @@ supple_status supple_set_pressure(supple_loads *loads,
 /**
  * Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
  * on it at its time, with what fills it. SUPPLE_E_NOT_FINITE where nodes are so far away that this is no number.
+ * SUPPLE_E_CAPACITY: there is no such surface.
  *
- * @param cubic_metres may be NULL; receives the volume, m^3.
+ * @param cubic_metres may be NULL; receives the volume, m^3; NaN of a surface that is open or has no triangles.
  * @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
  */
 supple_status supple_pressure_now(const supple_pressure *pressure,
@@ -2131,8 +2135,8 @@ supple_status supple_pulls_init(void *memory,
  * Adds a pull on the nodes that are no farther from its point than its radius at rest: their mean displacement moves it. A patch of
  * some 24 nodes is a good one. It has no target yet: it is absent until supple_set_targets.
  *
- * @param points of all nodes of the scene at rest, m, three coordinates each.
- * @param error may be NULL.
+ * @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
+ * @param error may be NULL; index is that of the pull, of SUPPLE_E_POINTS that of an element.
  */
 supple_status supple_add_pull(supple_pulls *pulls,
                               const supple_scene *scene,
@@ -2141,7 +2145,8 @@ supple_status supple_add_pull(supple_pulls *pulls,
                               supple_error *error);
 
 /**
- * Adds a pull on `count` nodes with weights, which sum up to one, as supple_locate gives them for a point in an element.
+ * Adds a pull on `count` nodes with weights, which sum up to one, as supple_locate gives them for a point in an element. Other sums
+ * are refused (SUPPLE_E_PULL): the point would move by more or less than its nodes.
  *
  * @param error may be NULL; node is one that does not exist.
  */
@@ -2166,9 +2171,9 @@ supple_status supple_set_pull(supple_pulls *pulls,
 /**
  * Sets the targets of all pulls, m, three coordinates each; of a pull whose first coordinate is NaN there is none: it is absent
  * until it has one again. A target moves evenly from where it is at the time `from` (s) to there at the time `to`, usually
- * the times of the state now and at the end of the frame; one that was absent is there at once.
+ * the times of the state now and at the end of the frame; one that was absent is there at once, and with `to` before `from` all are.
  *
- * @param error may be NULL; index is that of a pull.
+ * @param error may be NULL; index is that of a pull; of a time that is not finite (SUPPLE_E_NEGATIVE) there is none.
  */
 supple_status supple_set_targets(supple_pulls *pulls,
                                  const float *targets,
@@ -2196,7 +2201,8 @@ supple_status supple_set_targets_from(supple_pulls *pulls,
  * moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart. A
  * pull that is added to a body that has turned is turned by this, too.
  *
- * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param points the points that the scene was built from, three coordinates each. They are looked at in some elements only
+ * (SUPPLE_E_POINTS).
  * @param most the largest change of a point, m; may be NULL.
  */
 supple_status supple_turn_pulls(supple_pulls *pulls,
@@ -2272,7 +2278,8 @@ supple_status supple_copy_forces(const supple_state *state,
  *
  * @param tetrahedra four nodes of each element, from zero. Of an element with a negative volume the triangles are seen from
  * within, and a pressure on them pulls: turn such elements before, also where the scene is built with
- * SUPPLE_WINDING_NORMALISED, which does not change this array.
+ * SUPPLE_WINDING_NORMALISED, which does not change this array. Leave out those that are removed: the cut is part of the
+ * boundary of the others.
  * @param triangles room for `room` of them; four for each element are needed while they are found.
  * @param count receives how many at the beginning are of the boundary.
  */
@@ -2404,11 +2411,12 @@ size_t supple_contact_size(uint32_t nodes,
 /**
  * Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
  *
- * @param points of all nodes of the scene at rest, m, three coordinates each.
- * @param surface what can be touched; it is copied.
+ * @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
+ * @param surface what can be touched; it is copied. A triangle with a corner that belongs to no element, as those of tissue
+ * that is removed, is refused (SUPPLE_E_MESH_UNUSED_NODE).
  * @param grips most nodes that instruments hold at once.
  * @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is
- * not among these nodes, or twice the same.
+ * not among these nodes, twice the same, or of no element; of SUPPLE_E_POINTS that of an element.
  */
 supple_status supple_contact_init(void *memory,
                                   size_t bytes,
@@ -2432,7 +2440,8 @@ supple_status supple_set_instruments(supple_contact *contact,
 
 /**
  * Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time
- * `to`, usually the times of the state now and at the end of the frame. Before and after it stands still.
+ * `to`, usually the times of the state now and at the end of the frame. Before and after it stands still; with `to` before
+ * `from` it is there at once.
  *
  * @param error may be NULL.
  */
@@ -2448,6 +2457,7 @@ supple_status supple_move_instrument(supple_contact *contact,
  * forceps do; those that it or another one holds already it leaves as they are. They move with it, whatever force that
  * takes, until supple_let_go.
  *
+ * @param within zero or more (SUPPLE_E_NEGATIVE).
  * @param held may be NULL; receives how many nodes it holds.
  */
 supple_status supple_grasp(supple_contact *contact,

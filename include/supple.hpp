@@ -369,10 +369,13 @@ template <class T> struct [[nodiscard]] result {
         separate(), add(std::snprintf(at(), left(), "%s", terms[what.axis]));
     } else if (what.axis < 3 && (code == status::e_relaxation_share || code == status::e_relaxation_time))
         separate(), add(std::snprintf(at(), left(), "term %lu", 0ul + what.axis));
-    else if (what.axis < 3)
+    else if (what.axis < 3 && code == status::e_negative) {
+        const char *const quantities[] = {"tolerance", "damping", "time"};
+        separate(), add(std::snprintf(at(), left(), "%s", quantities[what.axis]));
+    } else if (what.axis < 3)
         separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
-    const bool is_nan = what.value != what.value;
-    if (means.has_value && (!is_nan || code == status::e_not_finite))
+    const bool is_known = what.value == what.value || what.limit == what.limit;
+    if (means.has_value && is_known)
         separate(), add(std::snprintf(at(), left(), "%.6g%s", what.value, means.unit));
     if (means.has_limit && what.limit == what.limit)
         separate(), add(std::snprintf(at(), left(), "against %.6g%s", what.limit, means.unit));
@@ -805,6 +808,13 @@ template <class T> bool has_points(scene body, span<const float> points, result<
     return bool(answer);
 }
 
+// The same where there is only a status to tell.
+inline status needs_points(scene body, span<const float> points, error *why) noexcept {
+    result<bool> answer{};
+    if (!has_points(body, points, answer) && why) *why = answer.error;
+    return answer.status;
+}
+
 } // namespace detail
 
 // Steps beyond the critical one. One thread at a time.
@@ -1018,7 +1028,7 @@ public:
         return detail::of(supple_pressure_fill(raw_, surface, cubic_metres, bulk));
     }
 
-    // Volume within a closed surface, m^3.
+    // Volume within a closed surface, m^3; NaN of an open one.
     [[nodiscard]] result<double> volume(state at, std::uint32_t surface = 0) const noexcept {
         result<double> found{};
         found.status = detail::of(supple_pressure_now(raw_, at.raw(), surface, &found.value, nullptr));
@@ -1213,6 +1223,8 @@ public:
     // Adds one on the nodes within its radius, or on nodes with weights; it is absent until it has a target. `points` are those of the
     // scene at rest, m.
     status add(scene of, span<const float> points, const pull &wanted, error *why = nullptr) const noexcept {
+        const status there = detail::needs_points(of, points, why);
+        if (!is_done(there)) return there;
         return detail::of(supple_add_pull(raw_, of.raw(), points.data(), &wanted, why));
     }
     status add(scene of, span<const std::uint32_t> nodes, span<const float> weights, const pull &wanted,
@@ -1233,8 +1245,17 @@ public:
         return detail::of(supple_set_targets(raw_, targets.data(), static_cast<std::uint32_t>(count < none ? count : none), from, to, why));
     }
 
+    // Those of some pulls, from one on; the others go on as they do.
+    status aim_from(std::uint32_t first, span<const float> targets, double from, double to, error *why = nullptr) const noexcept {
+        const std::size_t count = targets.size() / 3;
+        return detail::of(
+            supple_set_targets_from(raw_, first, targets.data(), static_cast<std::uint32_t>(count < none ? count : none), from, to, why));
+    }
+
     // Turns the points with the body, between frames; `most` is the largest change, m. `points` are those of the scene at rest.
     status turn(scene of, span<const float> points, state moved, float *most = nullptr) const noexcept {
+        const status there = detail::needs_points(of, points, nullptr);
+        if (!is_done(there)) return there;
         return detail::of(supple_turn_pulls(raw_, of.raw(), points.data(), moved.raw(), most));
     }
 
@@ -1293,6 +1314,27 @@ private:
     supple_reaction *raw_ = nullptr;
 };
 
+namespace detail {
+
+// The boundary of the elements that are left of a body, which are copied to the end of `room` if some are removed.
+inline result<std::size_t> boundary_of(const body &from, span<std::uint32_t> room) noexcept {
+    const std::size_t elements = from.tetrahedra.size() / 4;
+    if (from.removed.size() == 0) return boundary(from.tetrahedra, room);
+    const auto refuse = [](std::size_t value, std::size_t limit) -> result<std::size_t> {
+        return {status::e_short, nothing(status::e_short, static_cast<double>(value), static_cast<double>(limit)), 0};
+    };
+    if (from.removed.size() < elements) return refuse(from.removed.size(), elements);
+    std::size_t left = 0;
+    for (std::size_t element = 0; element < elements; element++) left += from.removed[element] == 0;
+    if (room.size() / 16 < left) return refuse(room.size(), 16 * left);
+    std::uint32_t *const kept = room.data() + (room.size() - 4 * left), *next = kept;
+    for (std::size_t element = 0; element < elements; element++)
+        for (std::size_t corner = 0; corner < 4 && from.removed[element] == 0; corner++) *next++ = from.tetrahedra[4 * element + corner];
+    return boundary({kept, 4 * left}, {room.data(), 12 * left});
+}
+
+} // namespace detail
+
 // What moves a simulation. exact: steps below the critical one. long_steps: steps beyond it, and a guard. automatic: exact and long ones
 // as long as a tolerance allows. learned: a network's.
 enum class steps : std::uint32_t {
@@ -1317,10 +1359,11 @@ struct settings : supple_settings {
         return *this;
     }
     // What these instruments can touch: all nodes of a body, and its boundary's triangles if one of them is thinner than edges are long.
-    // `room`, twelve numbers an element, must stay until the simulation has been set up.
+    // `room`, twelve numbers an element, or where some are removed sixteen for each that is left, must stay until the simulation has been
+    // set up.
     status touchable_by(span<const instrument> tools, const body &from, span<std::uint32_t> room, std::uint32_t grips_at_once = 0,
                         error *why = nullptr) noexcept {
-        const auto found = boundary(from.tetrahedra, room);
+        const auto found = detail::boundary_of(from, room);
         if (why) *why = found.error;
         if (!found) return found.status;
         const std::size_t nodes = from.points.size() / 3;

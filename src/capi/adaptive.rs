@@ -16,7 +16,7 @@ use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, Head, Layout, Object, Place, magic, place_for, place_if_wanted};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
-use super::status::{Answer, supple_error, supple_status};
+use super::status::{Answer, Quantity, negative, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads};
 use supple_status::*;
 
@@ -113,7 +113,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let mut state = opened_of(&open, state)?;
         let request = LargeRequest::of(&open, points, config)?;
         if !(tolerance.is_finite() && tolerance > 0.0) {
-            return Err(supple_error::from(SUPPLE_E_NEGATIVE).value(tolerance.into(), 0.0));
+            return Err(negative(Quantity::Tolerance, tolerance.into()));
         }
         let longest = Step::unchecked(request.config.seconds, request.config.damping)?;
         let asked = Request { tolerance, longest };

@@ -189,11 +189,12 @@ pub extern "C" fn supple_contact_size(nodes: u32, triangles: u32, grips: u32) ->
 
 /// Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
 ///
-/// @param points of all nodes of the scene at rest, m, three coordinates each.
-/// @param surface what can be touched; it is copied.
+/// @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
+/// @param surface what can be touched; it is copied. A triangle with a corner that belongs to no element, as those of tissue
+/// that is removed, is refused (SUPPLE_E_MESH_UNUSED_NODE).
 /// @param grips most nodes that instruments hold at once.
 /// @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is
-/// not among these nodes, or twice the same.
+/// not among these nodes, twice the same, or of no element; of SUPPLE_E_POINTS that of an element.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_contact_init(
     memory: *mut c_void,
@@ -209,10 +210,12 @@ pub unsafe extern "C" fn supple_contact_init(
     let init = || unsafe {
         let (open, contact) = (OpenScene::of(scene)?, place_for(contact)?);
         let (nodes, surface) = (open.node_count(), one(surface)?);
-        let given = Given::new(surface, array(points.cast(), nodes)?)?;
+        let points = array(points.cast(), nodes)?;
+        let given = Given::new(surface, points)?;
         let room = Room { nodes: surface.node_count, triangles: surface.triangle_count, grips };
         let place = Place::new(memory, bytes, room.layout())?;
-        given.check()?;
+        given.check(|node| open.view().is_alone(node))?;
+        open.has_points(points)?;
         let parts = room.parts(place.arrays::<supple_contact>());
         for (index, entry) in parts.nodes.iter_mut().enumerate() {
             *entry = given.node(index)?;
@@ -281,9 +284,10 @@ pub(super) unsafe fn checked(given: &supple_instrument, index: usize) -> Answer<
         SUPPLE_SPHERE => Shape::Sphere { radius },
         SUPPLE_CAPSULE => Shape::Capsule { radius, length },
         SUPPLE_FIELD => {
+            let damaged = supple_error::from(SUPPLE_E_FIELD).at(index);
             // SAFETY: the caller's promise.
-            let bytes = unsafe { lasting_bytes(field, field_bytes)? };
-            Shape::Field(Field::parse(bytes).map_err(|_| supple_error::from(SUPPLE_E_FIELD).at(index))?)
+            let bytes = unsafe { lasting_bytes(field, field_bytes) };
+            Shape::Field(bytes.and_then(|bytes| Field::parse(bytes).map_err(|_| damaged)).map_err(|_| damaged)?)
         }
         other => return Err(supple_error::from(SUPPLE_E_CHOICE).at(index).value(other.into(), 0.0)),
     };
@@ -299,18 +303,30 @@ fn check(instrument: &Instrument<'_>, index: usize) -> Answer<()> {
     Surface::new(&[], 0).and_then(|surface| Contact::new(surface, &[*instrument]).map(|_| ())).map_err(|error| {
         match error {
             ContactError::Instrument { value, .. } => refused(value),
-            _ => refused(f32::NAN),
+            // Of a pose.
+            _ => {
+                let numbers = |pose: Pose| pose.position.into_iter().chain(pose.rotation);
+                let mut all = [instrument.from, instrument.to].into_iter().flat_map(numbers);
+                refused(all.find(|value| !value.is_finite()).unwrap_or(f32::NAN))
+            }
         }
     })
 }
 
 fn pose_of(pose: &supple_pose) -> Pose {
     let &supple_pose { position, rotation } = pose;
-    if rotation == [0.0; 4] { Pose::at(position) } else { Pose { position, rotation } }
+    let largest = rotation.into_iter().fold(0.0_f32, |most, value| most.max(value.abs()));
+    if rotation == [0.0; 4] {
+        return Pose::at(position);
+    }
+    // Of any length: without its power of two, which rounds nothing, its square is neither zero nor infinite.
+    let power = f32::from_bits(largest.to_bits() & f32::INFINITY.to_bits()).max(f32::MIN_POSITIVE);
+    Pose { position, rotation: rotation.map(|value| value / power) }
 }
 
 /// Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time
-/// `to`, usually the times of the state now and at the end of the frame. Before and after it stands still.
+/// `to`, usually the times of the state now and at the end of the frame. Before and after it stands still; with `to` before
+/// `from` it is there at once.
 ///
 /// @param error may be NULL.
 #[unsafe(no_mangle)]
@@ -327,7 +343,7 @@ pub unsafe extern "C" fn supple_move_instrument(
         let (object, pose) = (memory::change(contact)?, one(pose)?);
         let (index, count) = (instrument as usize, object.instruments);
         let Some(place) = object.list.get_mut(..count as usize).and_then(|list| list.get_mut(index)) else {
-            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), count.into()));
+            return Err(missing(instrument, count));
         };
         let mut moved = *place;
         moved.move_to(pose_of(pose), from, to);
@@ -343,6 +359,7 @@ pub unsafe extern "C" fn supple_move_instrument(
 /// forceps do; those that it or another one holds already it leaves as they are. They move with it, whatever force that
 /// takes, until supple_let_go.
 ///
+/// @param within zero or more (SUPPLE_E_NEGATIVE).
 /// @param held may be NULL; receives how many nodes it holds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_grasp(
@@ -363,10 +380,11 @@ pub unsafe extern "C" fn supple_grasp(
         if !within.is_finite() {
             return Err(supple_error::from(SUPPLE_E_NOT_FINITE).value(within.into(), 0.0));
         }
+        if within < 0.0 {
+            return Err(supple_error::from(SUPPLE_E_NEGATIVE).value(within.into(), 0.0));
+        }
         let list = object.list.get(..object.instruments as usize).unwrap_or_default();
-        let Some(tool) = list.get(instrument as usize) else {
-            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into()));
-        };
+        let tool = list.get(instrument as usize).ok_or(missing(instrument, object.instruments))?;
         let ContactArrays { nodes, grips, .. } = object.room().parts(arrays);
         let surface = Surface::new(nodes, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
         let near = || tool.grips(instrument, surface, state.displacements(), state.time(), within);
@@ -390,6 +408,10 @@ pub unsafe extern "C" fn supple_grasp(
         Ok(SUPPLE_OK)
     };
     status_of(grasp())
+}
+
+fn missing(instrument: u32, instruments: u32) -> supple_error {
+    supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), instruments.into())
 }
 
 /// Inserts a grip in the order of the places; there is room for it.
@@ -463,6 +485,9 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
     let let_go = || unsafe {
         let (object, arrays) = memory::open(contact)?;
         let ContactArrays { grips, .. } = object.room().parts(arrays);
+        if instrument >= object.instruments {
+            return Err(missing(instrument, object.instruments));
+        }
         let mut end = 0;
         for at in 0..object.grips as usize {
             if let Some(grip) = grips.get(at).copied().filter(|grip| grip.instrument != instrument)
@@ -491,7 +516,7 @@ pub unsafe extern "C" fn supple_read_touch(
         let index = instrument as usize;
         let touches = object.touches.get(..object.instruments as usize).unwrap_or_default();
         let (Some(&touch), Some(&mean_force)) = (touches.get(index), object.means.get(index)) else {
-            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into()));
+            return Err(missing(instrument, object.instruments));
         };
         let Touch { force, moment, contacts, depth, work, friction_loss } = touch;
         place.write(supple_touch { force, moment, mean_force, contacts, depth, work, friction_loss });

@@ -15,7 +15,7 @@ use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
-use super::status::{Answer, status_of, supple_error, supple_status};
+use super::status::{Answer, Quantity, negative, status_of, supple_error, supple_status};
 use super::step::{HostThreads, answer, supple_threads};
 use supple_status::*;
 
@@ -164,7 +164,7 @@ fn allowed(tolerance: f32) -> Answer<Allowed> {
     match tolerance {
         0.0 => Ok(Allowed::ShareOfMotion),
         metres if metres.is_finite() && metres > 0.0 => Ok(Allowed::Metres(metres)),
-        other => Err(supple_error::from(SUPPLE_E_NEGATIVE).value(other.into(), 0.0)),
+        other => Err(negative(Quantity::Tolerance, other.into())),
     }
 }
 

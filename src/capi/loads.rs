@@ -12,7 +12,7 @@ use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
 use super::pressure::{self, supple_pressure};
 use super::pulls::{CallPulls, supple_pulls};
-use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
+use super::scene::{OpenScene, axes_of, check_axes, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
 
@@ -35,7 +35,7 @@ pub struct supple_force {
 pub struct supple_motion {
     /// From zero.
     pub node: u32,
-    /// Axes that follow: 1 for x, 2 for y, 4 for z, or their sum.
+    /// Axes that follow, at least one: 1 for x, 2 for y, 4 for z, or their sum.
     pub axes: u32,
     /// Full displacement from rest, m.
     pub metre: [f32; 3],
@@ -215,7 +215,7 @@ pub unsafe extern "C" fn supple_set_motions(
             ramp,
         });
         for (index, (motion, given)) in motions.clone().zip(given).enumerate() {
-            check_choice(index, given.axes, 7)?;
+            check_axes(index, given.axes)?;
             let movable = open.view().movable(motion.node as usize);
             motion.check(index, object.nodes as usize, movable)?;
         }

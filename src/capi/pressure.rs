@@ -46,12 +46,12 @@ pub extern "C" fn supple_pressure_size(triangles: u32, surfaces: u32) -> usize {
 
 /// Prepares pressures, zero yet, in `memory` of at least supple_pressure_size bytes, aligned to SUPPLE_ALIGN.
 ///
-/// @param points of all nodes of the scene at rest, m, three coordinates each.
+/// @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
 /// @param triangles three nodes of each of `count` triangles, as of supple_boundary: seen from outside of the tissue
 /// counter-clockwise.
 /// @param surface_of the surface of each triangle, from zero; NULL: all are of surface 0.
 /// @param surfaces how many there are, each with a pressure of its own.
-/// @param error may be NULL; index is that of a triangle.
+/// @param error may be NULL; index is that of a triangle, of SUPPLE_E_POINTS that of an element.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_pressure_init(
     memory: *mut c_void,
@@ -84,6 +84,7 @@ pub unsafe extern "C" fn supple_pressure_init(
         for triangle in made() {
             triangle?;
         }
+        open.has_points(points)?;
         let place = Place::new(memory, bytes, layout(count, surfaces))?;
         let mut arrays = place.arrays::<supple_pressure>();
         let room = arrays.change::<PressedTriangle>(count as usize);
@@ -119,7 +120,7 @@ pub unsafe extern "C" fn supple_pressure_set(
 /// Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
 /// within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
 /// the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps. A surface that
-/// is open is refused (SUPPLE_E_OPEN_SURFACE).
+/// is open or has no triangles is refused (SUPPLE_E_OPEN_SURFACE).
 ///
 /// @param cubic_metres m^3, above zero.
 /// @param bulk Pa; 0: the volume is not asked for.
@@ -146,17 +147,31 @@ unsafe fn change(
     // SAFETY: the caller's promise; entries were written when it was prepared.
     let set = || unsafe {
         let (object, mut arrays) = memory::open(pressure)?;
-        let count = object.surfaces.into();
         let triangles = arrays.change::<PressedTriangle>(object.triangles as usize);
         let surfaces = arrays.change::<SurfacePressure>(object.surfaces as usize);
-        let place = surfaces.get_mut(surface as usize);
-        let place = place.ok_or(supple_error::from(SUPPLE_E_CAPACITY).value(surface.into(), count))?;
+        let place = surfaces.get_mut(surface as usize).ok_or(missing(surface, object.surfaces))?;
         let asked = to(*place);
-        asked.check_on(surface as usize, triangles)?;
+        asked.check(surface as usize)?;
+        if asked.bulk > 0.0 {
+            check_closed(surface, triangles)?;
+        }
         *place = asked;
         Ok(SUPPLE_OK)
     };
     status_of(set())
+}
+
+fn missing(surface: u32, surfaces: u32) -> supple_error {
+    supple_error::from(SUPPLE_E_CAPACITY).value(surface.into(), surfaces.into())
+}
+
+/// That a surface has a volume.
+fn check_closed(surface: u32, triangles: &[PressedTriangle]) -> Answer<()> {
+    let index = surface as usize;
+    if !triangles.iter().any(|triangle| triangle.surface() == surface) {
+        return Err(LoadError::Open { index }.into());
+    }
+    Ok(SurfacePressure::filling(1.0, 1.0, 0.0).check_on(index, triangles)?)
 }
 
 /// Lets pressures act where these loads do, as long as both are there; NULL: none do. A copy of the loads has the same
@@ -183,8 +198,9 @@ pub unsafe extern "C" fn supple_set_pressure(
 
 /// Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
 /// on it at its time, with what fills it. SUPPLE_E_NOT_FINITE where nodes are so far away that this is no number.
+/// SUPPLE_E_CAPACITY: there is no such surface.
 ///
-/// @param cubic_metres may be NULL; receives the volume, m^3.
+/// @param cubic_metres may be NULL; receives the volume, m^3; NaN of a surface that is open or has no triangles.
 /// @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_pressure_now(
@@ -198,18 +214,22 @@ pub unsafe extern "C" fn supple_pressure_now(
     let tell = || unsafe {
         let (volume, now) = (place_if_wanted(cubic_metres)?, place_if_wanted(pascal)?);
         let ([displacement, ..], state) = (vectors(state)?, memory::read(state)?);
-        let (there, surface) = (memory::read(pressure)?.nodes, surface as usize);
+        let &supple_pressure { nodes: there, triangles, surfaces, .. } = memory::read(pressure)?;
         if state.nodes != there {
             return Err(mismatch(state.nodes as usize, there as usize));
         }
-        let pressure = opened(pressure)?;
+        if surface >= surfaces {
+            return Err(missing(surface, surfaces));
+        }
+        let is_closed = || check_closed(surface, Arrays::behind(pressure).read(triangles as usize)).is_ok();
+        let (pressure, surface) = (opened(pressure)?, surface as usize);
         let is =
             (pressure.volume(surface, displacement), pressure.pascal(surface, state.progress.time(), displacement));
         if !(is.0.is_finite() && is.1.is_finite()) {
             return Err(supple_error::from(SUPPLE_E_NOT_FINITE));
         }
         if let Some(volume) = volume {
-            volume.write(is.0);
+            volume.write(if is_closed() { is.0 } else { f64::NAN });
         }
         if let Some(now) = now {
             now.write(is.1);

@@ -10,7 +10,7 @@ use super::loads::supple_loads;
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened, supple_state};
-use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
+use super::status::{Answer, Quantity, mismatch, negative, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// How a point is pulled.
@@ -166,8 +166,8 @@ pub(super) unsafe fn let_go_of_removed(pulls: *mut supple_pulls, scene: &OpenSce
 /// Adds a pull on the nodes that are no farther from its point than its radius at rest: their mean displacement moves it. A patch of
 /// some 24 nodes is a good one. It has no target yet: it is absent until supple_set_targets.
 ///
-/// @param points of all nodes of the scene at rest, m, three coordinates each.
-/// @param error may be NULL.
+/// @param points the points that the scene was built from, three coordinates each (SUPPLE_E_POINTS).
+/// @param error may be NULL; index is that of the pull, of SUPPLE_E_POINTS that of an element.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_add_pull(
     pulls: *mut supple_pulls,
@@ -182,6 +182,7 @@ pub unsafe extern "C" fn supple_add_pull(
         let (given, open, first) = (one(pull)?, OpenScene::of(scene)?, object.nodes as usize);
         open.fits(object.scene_nodes)?;
         let points = array(points.cast::<[f32; 3]>(), object.scene_nodes as usize)?;
+        open.has_points(points)?;
         let parts = object.parts(arrays);
         let room = parts.nodes.get_mut(first..).unwrap_or_default();
         let count = patch(points, |node| open.view().node_mass(node), given.at, given.radius, room).map_err(
@@ -196,7 +197,8 @@ pub unsafe extern "C" fn supple_add_pull(
     unsafe { memory::answered(add(), error) }
 }
 
-/// Adds a pull on `count` nodes with weights, which sum up to one, as supple_locate gives them for a point in an element.
+/// Adds a pull on `count` nodes with weights, which sum up to one, as supple_locate gives them for a point in an element. Other sums
+/// are refused (SUPPLE_E_PULL): the point would move by more or less than its nodes.
 ///
 /// @param error may be NULL; node is one that does not exist.
 #[unsafe(no_mangle)]
@@ -224,11 +226,18 @@ pub unsafe extern "C" fn supple_add_pull_of_nodes(
             *place = PulledNode { node, weight };
         }
         Pulls::new(object.scene_nodes as usize, room, &[]).map_err(|error| refused(object.pulls as usize, error))?;
+        let sum = room.iter().fold(0.0_f32, |sum, pulled| sum + pulled.weight);
+        if (sum - 1.0).abs() > ROUNDING {
+            return Err(supple_error::from(SUPPLE_E_PULL).at(object.pulls as usize).value(sum.into(), 1.0));
+        }
         added(object, &open, parts, given, count)
     };
     // SAFETY: as above.
     unsafe { memory::answered(add(), error) }
 }
+
+/// By so much a sum of weights may differ from one.
+const ROUNDING: f32 = 1e-3;
 
 /// A pull whose nodes are the next ones of the list.
 fn added(
@@ -307,9 +316,9 @@ pub unsafe extern "C" fn supple_set_pull(
 
 /// Sets the targets of all pulls, m, three coordinates each; of a pull whose first coordinate is NaN there is none: it is absent
 /// until it has one again. A target moves evenly from where it is at the time `from` (s) to there at the time `to`, usually
-/// the times of the state now and at the end of the frame; one that was absent is there at once.
+/// the times of the state now and at the end of the frame; one that was absent is there at once, and with `to` before `from` all are.
 ///
-/// @param error may be NULL; index is that of a pull.
+/// @param error may be NULL; index is that of a pull; of a time that is not finite (SUPPLE_E_NEGATIVE) there is none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_set_targets(
     pulls: *mut supple_pulls,
@@ -369,6 +378,9 @@ unsafe fn set_targets(
         let (first, there) = (first as usize, object.pulls as usize);
         let own = object.parts(arrays).pulls.get_mut(first..).and_then(|own| own.get_mut(..targets.len()));
         let own = own.ok_or_else(|| mismatch(first.saturating_add(targets.len()), there))?;
+        if let Some(&time) = [from, to].iter().find(|time| !time.is_finite()) {
+            return Err(negative(Quantity::Time, time));
+        }
         for (index, (&pull, target)) in own.iter().zip(targets).enumerate() {
             let mut moved = pull;
             moved.move_to(*target, from, to);
@@ -384,7 +396,8 @@ unsafe fn set_targets(
 /// moves by more than that where the body turns: by 2 mm at 40 degrees with patches of 24 nodes 5 mm apart. A
 /// pull that is added to a body that has turned is turned by this, too.
 ///
-/// @param points of all nodes of the scene at rest, m, three coordinates each.
+/// @param points the points that the scene was built from, three coordinates each. They are looked at in some elements only
+/// (SUPPLE_E_POINTS).
 /// @param most the largest change of a point, m; may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_turn_pulls(
@@ -400,6 +413,7 @@ pub unsafe extern "C" fn supple_turn_pulls(
         let (open, state) = (OpenScene::of(scene)?, object.state(state)?);
         open.fits(object.scene_nodes)?;
         let points = array(points.cast::<[f32; 3]>(), object.scene_nodes as usize)?;
+        open.seems_to_have_points(points)?;
         let PullArrays { nodes, pulls, .. } = object.parts(arrays);
         let list = pulls.get_mut(..object.pulls as usize).unwrap_or_default();
         let mass = |node: usize| open.view().node_mass(node);

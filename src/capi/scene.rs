@@ -5,10 +5,12 @@ use core::slice::from_mut;
 
 use crate::copy::copy_apart;
 use crate::element::{ElementTile, FibreTile, NodeInertia, PatchRow};
+use crate::loads::FARTHEST;
 use crate::material::{Directions, Element, Fibres, Prony, TissueValues};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
-use crate::state::NodeVector;
+use crate::simd::TILE;
+use crate::state::{NodeVector, StateView};
 use crate::tled;
 
 use super::SUPPLE_NONE;
@@ -42,7 +44,7 @@ const _: () = assert!(SUPPLE_NODAL_STRAIN == Element::NodalStrain.code());
 pub struct supple_support {
     /// From zero.
     pub node: u32,
-    /// Held axes: 1 for x, 2 for y, 4 for z, or their sum; 7 for all.
+    /// Held axes, at least one: 1 for x, 2 for y, 4 for z, or their sum; 7 for all.
     pub axes: u32,
     /// 0: stands still. 1: motions may be prescribed.
     pub moves: u32,
@@ -310,6 +312,40 @@ impl<'a> OpenScene<'a> {
         let needed = self.node_count();
         if nodes as usize == needed { Ok(()) } else { Err(mismatch(nodes as usize, needed)) }
     }
+
+    /// A node that is so far away, or else so stiff, that no step can be bounded.
+    pub(super) fn stiffest(&self, state: StateView<'_>) -> Option<u32> {
+        let StateView { displacement, increment, force, volume, .. } = state;
+        let is_there = |moved: &NodeVector| moved.to_array().iter().all(|component| component.abs() <= FARTHEST);
+        let mut found = displacement.iter().position(|moved| !is_there(moved));
+        if found.is_none() {
+            tled::each_rate(self.view(), self.nodes, [displacement, increment, force], volume, |node, rate| {
+                found = found.or((!rate.is_finite()).then_some(node));
+            });
+        }
+        found.map(|node| node as u32)
+    }
+
+    /// That these are the points that its elements were built from.
+    pub(super) fn has_points(&self, points: &[[f32; 3]]) -> Answer<()> {
+        self.has_points_of_each(1, points)
+    }
+
+    /// The same for each frame, looking at some hundred elements: enough to see millimetres, another body, or points that have moved.
+    pub(super) fn seems_to_have_points(&self, points: &[[f32; 3]]) -> Answer<()> {
+        self.has_points_of_each((self.view().tiles.len() / 32).next_power_of_two(), points)
+    }
+
+    /// The same, looking at one in so many tiles, a power of two.
+    fn has_points_of_each(&self, number: usize, points: &[[f32; 3]]) -> Answer<()> {
+        let chosen = self.view().tiles.iter().enumerate().filter(|(place, _)| place & (number - 1) == 0);
+        let places = chosen.flat_map(|(_, tile)| (0..TILE).map(move |lane| (tile, lane)));
+        let mut places = places.filter(|(tile, lane)| tile.volume::<f32>(*lane) > 0.0);
+        match places.find(|&(tile, lane)| !tile.has_edges_of(lane, points)) {
+            Some((tile, lane)) => Err(supple_error::from(SUPPLE_E_POINTS).at(tile.element(lane))),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Elements that have a tissue of their own: all, or none where there is only one.
@@ -448,9 +484,10 @@ impl<'a> CheckedBody<'a> {
             )
         };
         for (index, support) in supports.iter().enumerate() {
-            check_choice(index, support.axes, 7)?;
+            check_axes(index, support.axes)?;
             check_choice(index, support.moves, 1)?;
         }
+        check_coordinates(points)?;
         // SAFETY: the caller's promise.
         let (removed, (series, _), (fibres, directions)) =
             unsafe { (removed_of(config)?, series_of(config)?, fibres_of(config)?) };
@@ -544,7 +581,10 @@ pub(super) unsafe fn set_tissues(scene: *mut supple_scene, tissues: &[TissueValu
         let mut changed = [**facts];
         let [facts] = &mut changed;
         if !facts.change_constants(tiles, material, &new)? {
-            return Err(SUPPLE_E_MISMATCH.into());
+            let mut both =
+                tissues.iter().zip(material.tissues).map(|(new, old)| [new.density, old.density]).enumerate();
+            let (index, [new, old]) = both.find(|(_, [new, old])| new != old).unwrap_or_default();
+            return Err(supple_error::from(SUPPLE_E_MISMATCH).at(index).value(new.into(), old.into()));
         }
         let (nodes, elements) = ((*scene).nodes as usize, (*scene).elements as usize);
         copy_apart(from_mut(&mut (*scene).facts), &changed);
@@ -562,6 +602,27 @@ pub(super) fn check_choice(index: usize, value: u32, most: u32) -> Answer<()> {
         return Ok(());
     }
     Err(supple_error::from(SUPPLE_E_CHOICE).at(index).value(value.into(), most.into()))
+}
+
+/// That the axes of entry `index` of a list are at least one of the three.
+pub(super) fn check_axes(index: usize, axes: u32) -> Answer<()> {
+    match axes {
+        0 => Err(supple_error::from(SUPPLE_E_CHOICE).at(index).value(0.0, 7.0)),
+        axes => check_choice(index, axes, 7),
+    }
+}
+
+/// That no coordinate is so large that an element with it would be called flat. One that is no number is told of the mesh.
+fn check_coordinates(points: &[[f32; 3]]) -> Answer<()> {
+    for (node, at) in points.iter().enumerate() {
+        for (axis, &value) in at.iter().enumerate() {
+            if value.abs() > FARTHEST {
+                let error = supple_error::from(SUPPLE_E_NOT_FINITE).at(node).node(node as u32);
+                return Err(error.axis(axis).value(value.into(), FARTHEST.into()));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The axes of a number below eight.

@@ -33,7 +33,7 @@ use super::scene::{
     supple_scene_size,
 };
 use super::state::{critical_step, opened_of, supple_state, supple_state_init, supple_state_size};
-use super::status::{Answer, short, status_of, supple_error, supple_status};
+use super::status::{Answer, Quantity, negative, short, status_of, supple_error, supple_status};
 use super::step::{HostThreads, Reported, answer, reported, supple_report, supple_threads, worse};
 use super::surface::supple_surface;
 use supple_status::*;
@@ -59,7 +59,8 @@ pub struct supple_settings {
     pub steps: u32,
     /// Length of the steps, s; 0: chosen. Of long steps at most so much, 20 critical steps unless given; of exact
     /// ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
-    /// the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+    /// the critical step falls while they are taken: above the critical step of the state as it is they are refused
+    /// (SUPPLE_E_UNSTABLE); of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
     pub seconds: f32,
     /// Damping proportional to mass, 1/s, zero or more. A network has that of its training.
     pub damping: f32,
@@ -400,9 +401,9 @@ impl supple_settings {
         check_choice(none, self.steps, SUPPLE_STEPS_LEARNED)?;
         check_choice(none, self.guard, 1)?;
         check_choice(none, self.fallback, 1)?;
-        for value in [f64::from(self.tolerance), self.lead_in] {
+        for (quantity, value) in [(Quantity::Tolerance, f64::from(self.tolerance)), (Quantity::Time, self.lead_in)] {
             if !(value.is_finite() && value >= 0.0) {
-                return Err(supple_error::from(SUPPLE_E_NEGATIVE).value(value, 0.0));
+                return Err(negative(quantity, value));
             }
         }
         // A length of zero is none that is given.

@@ -175,7 +175,10 @@ pub unsafe extern "C" fn supple_critical_step(
 
 pub(super) fn critical_step(open: &OpenScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
     let critical = tled::critical_step(&open.view(), state);
-    critical.ok_or(SUPPLE_E_TOO_STIFF.into())
+    critical.ok_or_else(|| {
+        let error = supple_error::from(SUPPLE_E_TOO_STIFF);
+        open.stiffest(state.reborrow()).map_or(error, |node| error.node(node))
+    })
 }
 
 /// Sets the exact step of a state, for all calls that follow. Refused above the critical step at the state's

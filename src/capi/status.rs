@@ -56,18 +56,19 @@ pub enum supple_status {
     SUPPLE_E_KIND = -6,
     /// A number that stands for a choice (value) is none of the choices.
     SUPPLE_E_CHOICE = -7,
-    /// Objects for scenes with other numbers of nodes (value, limit), or a saved state of tissue that remembers other
-    /// bytes (value) than that of the state (limit).
+    /// Objects for scenes with other numbers of nodes, or lists of another length (value, limit); or a saved state of tissue that
+    /// remembers other bytes (value) than that of the state (limit); or tissue `index` is to have another density (value,
+    /// kg/m^3) than it has (limit).
     SUPPLE_E_MISMATCH = -8,
     /// More (value) than there is room for (limit).
     SUPPLE_E_CAPACITY = -9,
     /// Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit:
     /// nodes).
     SUPPLE_E_INDEX = -10,
-    /// Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of a pressed point beyond 1e6 m.
+    /// Entry or node `index` has a number (value) that is NaN or infinite, or a coordinate of the mesh beyond 1e6 m.
     SUPPLE_E_NOT_FINITE = -11,
-    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s); or a
-    /// tolerance (m); or a span of supple_sim_advance (s), which must be above zero.
+    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a span of supple_sim_advance (s), which must be
+    /// above zero; or as axis tells a tolerance (0; m), a damping (1; 1/s), a lead-in or a time of targets (2; s).
     SUPPLE_E_NEGATIVE = -12,
     /// An array that is written overlaps the object that is read.
     SUPPLE_E_OVERLAP = -13,
@@ -87,7 +88,7 @@ pub enum supple_status {
     SUPPLE_E_MESH_DEGENERATE = -22,
     /// Element `index` has a negative volume (value, m^3) and winding is SUPPLE_WINDING_CHECKED.
     SUPPLE_E_MESH_INVERTED = -23,
-    /// `node` belongs to no element.
+    /// `node` belongs to no element; with index: it is a corner of that triangle of a contact.
     SUPPLE_E_MESH_UNUSED_NODE = -24,
     /// A constant of the law of element `index` (value) is not a finite positive number.
     SUPPLE_E_CONSTANT = -25,
@@ -112,7 +113,8 @@ pub enum supple_status {
     SUPPLE_E_INSTRUMENT = -34,
     /// The field of instrument `index` is none, damaged, or reaches the rim of its grid.
     SUPPLE_E_FIELD = -35,
-    /// Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, or no nodes.
+    /// Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, no nodes, or weights
+    /// whose sum (value) is not one (limit).
     SUPPLE_E_PULL = -36,
     /// No node is nearer to the point of pull `index` than its radius (value, m); the nearest is at the limit (m).
     SUPPLE_E_NO_NODES = -37,
@@ -195,7 +197,7 @@ pub enum supple_status {
     /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
     /// around it (limit: its size, m).
     SUPPLE_E_DIVERGED_PRESSURE = -98,
-    /// Surface `index` is to be filled, but is open: it has no volume.
+    /// Surface `index` is to be filled, but is open or has no triangles: it has no volume.
     SUPPLE_E_OPEN_SURFACE = -99,
 }
 
@@ -211,7 +213,7 @@ pub struct supple_error {
     pub index: u32,
     /// Number of a node, from zero.
     pub node: u32,
-    /// 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these.
+    /// 0, 1, 2 for x, y, z; or of a tissue that relaxes or has fibres for the terms of these; or as the status says.
     pub axis: u32,
     /// The offending value; its unit stands with the status.
     pub value: f64,
@@ -256,6 +258,19 @@ pub(super) fn status_of(answer: Answer<supple_status>) -> supple_status {
 /// Fewer than needed.
 pub(super) fn short(there: usize, needed: usize) -> supple_error {
     supple_error::from(SUPPLE_E_SHORT).value(there as f64, needed as f64)
+}
+
+/// What of a call is negative or not finite, where it has several such numbers: the axis of the error.
+#[derive(Clone, Copy)]
+pub(super) enum Quantity {
+    Tolerance,
+    Damping,
+    Time,
+}
+
+/// Negative, or not finite.
+pub(super) fn negative(quantity: Quantity, value: f64) -> supple_error {
+    supple_error::from(SUPPLE_E_NEGATIVE).axis(quantity as usize).value(value, 0.0)
 }
 
 /// Objects of other sizes.
@@ -350,7 +365,7 @@ impl From<ReactionError> for supple_error {
                 is(SUPPLE_E_INDEX).at(index).node(node).value(node.into(), nodes as f64)
             }
             ReactionError::NotHeld { index, node } => is(SUPPLE_E_NOT_HELD).at(index).node(node),
-            ReactionError::Damping { damping } => is(SUPPLE_E_NEGATIVE).value(damping.into(), 0.0),
+            ReactionError::Damping { damping } => negative(Quantity::Damping, damping.into()),
         }
     }
 }
@@ -360,7 +375,7 @@ impl From<StepError> for supple_error {
         let is = Self::from;
         match error {
             StepError::Step { seconds } => is(SUPPLE_E_STEP).value(seconds.into(), 0.0),
-            StepError::Damping { damping } => is(SUPPLE_E_NEGATIVE).value(damping.into(), 0.0),
+            StepError::Damping { damping } => negative(Quantity::Damping, damping.into()),
             StepError::AboveCritical { seconds, critical } => {
                 is(SUPPLE_E_UNSTABLE).node(critical.node).value(seconds.into(), critical.seconds.into())
             }
@@ -442,10 +457,10 @@ fn text(status: i32) -> Option<&'static CStr> {
         -5 => c"the memory holds no object",
         -6 => c"the memory holds an object of another type",
         -7 => c"not one of the choices",
-        -8 => c"objects of scenes with other numbers of nodes, or of tissue that remembers other things",
+        -8 => c"objects of scenes with other nodes, a list of another length, or tissue of another density or that remembers other things",
         -9 => c"more than there is room for",
         -10 => c"a node that does not exist",
-        -11 => c"a number is not finite",
+        -11 => c"a number is not finite, or a coordinate is beyond 1e6 m",
         -12 => c"a number is negative or not finite",
         -13 => c"an array that is written overlaps the object that is read",
         -14 => c"the state was prepared for a scene of other elements",
@@ -468,7 +483,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -33 => c"the step is above the critical step",
         -34 => c"an instrument with a size, friction, time or pose that cannot be",
         -35 => c"the bytes of an instrument's field are none, or damaged",
-        -36 => c"a pull with a point, radius, direction, target, stiffness or most force that cannot be, or without nodes",
+        -36 => c"a pull with a point, radius, direction, target, stiffness or most force that cannot be, without nodes, or with weights that do not sum up to one",
         -37 => c"no node is nearer to the point of a pull than its radius",
         -38 => c"a tissue relaxes by a share that is not positive, or by more than may relax in sum",
         -39 => c"a tissue relaxes with a time that is not between a microsecond and a million seconds",

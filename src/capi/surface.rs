@@ -50,10 +50,17 @@ impl<'a> Given<'a> {
         }
     }
 
-    /// Whether all its nodes are the scene's and all corners its own.
-    pub(super) fn check(&self) -> Answer<()> {
+    /// Whether all its nodes are the scene's, and all corners its own and nodes of elements: a triangle with one that is not would be
+    /// touched where there is no tissue.
+    pub(super) fn check(&self, is_alone: impl Fn(usize) -> bool) -> Answer<()> {
         (0..self.node_count as usize).try_for_each(|index| self.node(index).map(|_| ()))?;
-        (0..self.triangles.len()).try_for_each(|index| self.corners(index).map(|_| ()))
+        for (index, corners) in self.triangles.iter().enumerate() {
+            self.corners(index)?;
+            if let Some(&node) = corners.iter().find(|node| is_alone(**node as usize)) {
+                return Err(supple_error::from(SUPPLE_E_MESH_UNUSED_NODE).at(index).node(node));
+            }
+        }
+        Ok(())
     }
 
     /// The entry of a node.
@@ -95,7 +102,8 @@ impl<'a> Given<'a> {
 ///
 /// @param tetrahedra four nodes of each element, from zero. Of an element with a negative volume the triangles are seen from
 /// within, and a pressure on them pulls: turn such elements before, also where the scene is built with
-/// SUPPLE_WINDING_NORMALISED, which does not change this array.
+/// SUPPLE_WINDING_NORMALISED, which does not change this array. Leave out those that are removed: the cut is part of the
+/// boundary of the others.
 /// @param triangles room for `room` of them; four for each element are needed while they are found.
 /// @param count receives how many at the beginning are of the boundary.
 #[unsafe(no_mangle)]

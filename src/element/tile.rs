@@ -2,7 +2,7 @@
 //! (m^3).
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::symmetric::Symmetric;
 use crate::mesh::gradients;
@@ -111,6 +111,23 @@ impl ElementTile {
     #[inline(always)]
     pub(crate) fn volume<R: Real>(&self, first: usize) -> R {
         vector_at(&self.volumes, first)
+    }
+
+    /// Whether an element has the edges between these points (m): `sum_a (x_a - x_0) ga^T` is one.
+    pub(crate) fn has_edges_of(&self, lane: usize, points: &[[f32; 3]]) -> bool {
+        // Slivers come near it by rounding.
+        const MOST: f64 = 0.05;
+        let at = |corner| {
+            points.get(self.node(corner, lane)).map(|point| DVec3::from_array(point.map(f64::from))).unwrap_or_default()
+        };
+        let origin = at(0);
+        let mut sum = DMat3::IDENTITY * -1.0;
+        for corner in 0..3 {
+            let gradient = [0, 1, 2].map(|axis| f64::from(self.gradient_of(corner, axis, lane)));
+            let edge = at(corner + 1) - origin;
+            sum += DMat3::from_cols(edge * gradient[0], edge * gradient[1], edge * gradient[2]);
+        }
+        sum.abs_diff_eq(DMat3::ZERO, MOST)
     }
 
     /// Copies the element at a place of some tiles to place `lane`.

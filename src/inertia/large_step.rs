@@ -3,9 +3,8 @@
 use core::mem::MaybeUninit;
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
-use glam::{DMat3, DVec3};
 
-use crate::element::{ElementMaterial, ElementTile, ScalarBound};
+use crate::element::{ElementMaterial, ScalarBound};
 use crate::loads::{LoadMark, Loads};
 use crate::material::Element;
 use crate::scene::SceneView;
@@ -491,29 +490,12 @@ fn checked_grid<M: ElementMaterial>(
     if points.len() != nodes {
         return Err(InertiaError::Points { points: points.len(), nodes });
     }
-    let other = scene.places().find(|&(tile, lane)| !has_edges_of(tile, lane, points));
+    let other = scene.places().find(|&(tile, lane)| !tile.has_edges_of(lane, points));
     if let Some((tile, lane)) = other {
         return Err(InertiaError::OtherPoints { element: tile.element(lane) });
     }
     let grid = method.grid(scene, points)?;
     if grid.functions > 0 { Ok(grid) } else { Err(InertiaError::TooSmall { nodes }) }
-}
-
-/// Whether an element has the edges between these points (m): `sum_a (x_a - x_0) ga^T` is one.
-fn has_edges_of(tile: &ElementTile, lane: usize, points: &[[f32; 3]]) -> bool {
-    // Slivers come near it by rounding.
-    const MOST: f64 = 0.05;
-    let at = |corner| {
-        points.get(tile.node(corner, lane)).map(|point| DVec3::from_array(point.map(f64::from))).unwrap_or_default()
-    };
-    let origin = at(0);
-    let mut sum = DMat3::IDENTITY * -1.0;
-    for corner in 0..3 {
-        let gradient = [0, 1, 2].map(|axis| f64::from(tile.gradient_of(corner, axis, lane)));
-        let edge = at(corner + 1) - origin;
-        sum += DMat3::from_cols(edge * gradient[0], edge * gradient[1], edge * gradient[2]);
-    }
-    sum.abs_diff_eq(DMat3::ZERO, MOST)
 }
 
 /// Writes how far the force of each node may move it in one step from rest, from the least height `1 / |ga|` of its

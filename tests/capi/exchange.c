@@ -154,8 +154,19 @@ static void instruments_follow(void) {
     advance(second, 5);
     supple_touch touch;
     CHECK(supple_read_touch(objects_of(second).contact, 0, &touch) == SUPPLE_OK && touch.contacts == 0);
-    CHECK(supple_grasp(objects_of(second).contact, objects_of(second).state, 0, -1.0f, &after) == SUPPLE_OK && after == 0);
+    /* Far from all nodes it holds what it held before. */
+    const supple_pose far = {{1.0f, 1.0f, 1.0f}, {0, 0, 0, 0}};
+    CHECK(supple_move_instrument(objects_of(second).contact, 0, &far, 0.0, 0.0, NULL) == SUPPLE_OK);
+    CHECK(supple_grasp(objects_of(second).contact, objects_of(second).state, 0, 0.0f, &after) == SUPPLE_OK && after == 0);
     printf("exchange: %u nodes were held, %u are\n", held, after);
+    /* A triangle of what has gone would be touched where there is no tissue. */
+    static const uint32_t gone[3] = {NODES - 1 - LAYER, NODES - 2, NODES - 1};
+    const supple_surface surface = {NULL, gone, NODES, 1};
+    supple_contact *none;
+    supple_error error;
+    const supple_scene *scene = objects_of(second).scene;
+    CHECK(supple_contact_init(contact_memory, sizeof contact_memory, scene, points[0], &surface, 0, &none, &error) == SUPPLE_E_MESH_UNUSED_NODE);
+    CHECK(error.index == 0 && error.node == NODES - 1 - LAYER);
 }
 
 static void refusals_change_nothing(void) {
@@ -189,6 +200,7 @@ static void refusals_change_nothing(void) {
     CHECK(supple_set_tissues(NULL, &other, 1, NULL) == SUPPLE_E_NULL);
     other = tissue, other.density = 900.0f;
     CHECK(supple_sim_set_tissues(first, &other, 1, &settings, &error) == SUPPLE_E_MISMATCH);
+    CHECK(error.index == 0 && error.value == 900.0 && error.limit == (double)tissue.density);
     CHECK(supple_state_carry_on(NULL, objects_of(first).state) == SUPPLE_E_NULL);
     CHECK(supple_state_carry_on(objects_of(first).scene, NULL) == SUPPLE_E_NULL);
     CHECK(supple_contact_carry_on(objects_of(first).contact, objects_of(first).scene, NULL) == SUPPLE_E_NULL);

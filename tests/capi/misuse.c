@@ -221,6 +221,8 @@ static void scenes(void) {
     } while (0)
     MESH(SUPPLE_E_NOT_FINITE, points[9][1], NAN);
     CHECK(error.index == 9 && error.node == 9 && error.axis == 1);
+    MESH(SUPPLE_E_NOT_FINITE, points[9][1], 1e30f);
+    CHECK(error.index == 9 && error.node == 9 && error.axis == 1 && error.value == (double)1e30f && error.limit == 1e6);
     MESH(SUPPLE_E_INDEX, tets[5][2], NODES);
     CHECK(error.index == 5 && error.node == NODES && error.limit == NODES);
     MESH(SUPPLE_E_MESH_REPEATED_NODE, tets[5][2], tets[5][1]);
@@ -232,6 +234,8 @@ static void scenes(void) {
     CHECK(error.index == 3 && error.node == NODES);
     MESH(SUPPLE_E_CHOICE, supports[3].axes, 8);
     CHECK(error.index == 3 && error.value == 8);
+    MESH(SUPPLE_E_CHOICE, supports[3].axes, 0);
+    CHECK(error.index == 3 && error.value == 0 && error.limit == 7);
     MESH(SUPPLE_E_CHOICE, supports[3].moves, 2);
     /* A mesh without the elements of its last layer. */
     SCENE(SUPPLE_E_MESH_UNUSED_NODE, bad.elements = TETS - 6 * X * Y);
@@ -284,6 +288,9 @@ static void acting(void) {
     CHECK(error.index == 1 && error.node == LAYER && error.axis == 0);
     motions[1].node = NODES - 2, motions[1].axes = 15;
     REFUSED(SUPPLE_E_CHOICE, supple_set_motions(loads, scene, motions, 2, &error));
+    motions[1].axes = 0;
+    REFUSED(SUPPLE_E_CHOICE, supple_set_motions(loads, scene, motions, 2, &error));
+    CHECK(error.index == 1 && error.value == 0);
     motions[1].axes = 7, motions[1].metre[2] = NAN;
     REFUSED(SUPPLE_E_NOT_FINITE, supple_set_motions(loads, scene, motions, 2, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_motions(loads, small_scene, motions, 1, &error));
@@ -508,7 +515,7 @@ static void divergence(void) {
     forge(FRONT + 16 * (NODES / 2), &far, sizeof far);
     DONE(supple_restore(state, saved, sizeof saved));
     CHECK(supple_critical_step(scene, state, &seconds, NULL) == SUPPLE_E_TOO_STIFF);
-    CHECK(supple_set_step(scene, state, &length, &error) == SUPPLE_E_TOO_STIFF);
+    CHECK(supple_set_step(scene, state, &length, &error) == SUPPLE_E_TOO_STIFF && error.node == NODES / 2);
     note(SUPPLE_E_TOO_STIFF);
 
     /* With half of its energy in the balance: the step is taken, and told not to be exact. */
@@ -615,12 +622,19 @@ static void guards(void) {
     CHECK(told == SUPPLE_INEXACT && estimate.known == 1 && estimate.mean > estimate.allowed && estimate.allowed == 1e-9f);
 }
 
-/* A call of one step for a second. */
-static void little_work(const supple_scene_config *config) {
-    supple_settings settings;
+/* A call of one step for a second, and settings that cannot be, of which the axis of the error tells the number. */
+static void settings_and_little_work(const supple_scene_config *config) {
+    supple_settings settings, wrong;
     DONE(supple_default_settings(&settings));
-    settings.most_steps = 1;
     size_t bytes = 0;
+#define SETTING(change, quantity)                                                                                      \
+    wrong = settings, (change);                                                                                        \
+    REFUSED(SUPPLE_E_NEGATIVE, supple_sim_size(config, &wrong, &bytes, &error));                                       \
+    CHECK(error.index == SUPPLE_NONE && error.axis == (quantity) && isnan(error.value))
+    SETTING(wrong.tolerance = NAN, 0);
+    SETTING(wrong.damping = NAN, 1);
+    SETTING(wrong.lead_in = NAN, 2);
+    settings.most_steps = 1;
     DONE(supple_sim_size(config, &settings, &bytes, &error));
     CHECK(bytes <= sizeof spare);
     supple_sim *sim = NULL;
@@ -705,6 +719,13 @@ static void reactions(void) {
     DONE(supple_reaction_follow(scene, state, reaction, &force));
     CHECK(force.known == 1 && force.newton[0] > 0.0f && force.spread >= 0.0f);
     printf("reaction: %.2f mN, spread %.2f mN\n", 1e3 * (double)force.newton[0], 1e3 * (double)force.spread);
+}
+
+/* The points of the scene in another unit. */
+static const float *in_millimetres(void) {
+    static float moved[NODES][3];
+    for (uint32_t n = 0; n < 3 * NODES; n++) moved[n / 3][n % 3] = 1e3f * points[n / 3][n % 3];
+    return moved[0];
 }
 
 /* Scenes that look as if a unit or a number was mistaken. */
@@ -869,10 +890,23 @@ static void pressures_and_rest(void) {
     REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_fill(pressure, 0, NAN, 1.0f));
     REFUSED(SUPPLE_E_CAPACITY, supple_pressure_fill(pressure, 2, 1e-3f, 1.0f));
     REFUSED(SUPPLE_E_MISMATCH, supple_pressure_now(pressure, small_state, 0, &volume, NULL));
-    /* Without its first triangle a surface is open, without any it is nothing. */
+    REFUSED(SUPPLE_E_CAPACITY, supple_pressure_now(pressure, state, 2, &volume, NULL));
+    /* Without its first triangle a surface is open, without any it is nothing: neither has a volume, both have a pressure. */
+    float now = 0.0f;
+    DONE(supple_state_reset(state));
     DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[1], NULL, count - 1, 1, &pressure, &error));
     REFUSED(SUPPLE_E_OPEN_SURFACE, supple_pressure_fill(pressure, 0, 1e-3f, 1.0f));
+    DONE(supple_pressure_now(pressure, state, 0, &volume, &now));
+    CHECK(isnan(volume) && now == 0.0f);
     DONE(supple_pressure_init(memory, bytes, scene, points[0], faces[0], surface_of, count, 2, &pressure, &error));
+    REFUSED(SUPPLE_E_OPEN_SURFACE, supple_pressure_fill(pressure, 1, 1e-3f, 1.0f));
+    DONE(supple_pressure_set(pressure, 1, 7.0f, 0.0f));
+    DONE(supple_pressure_now(pressure, state, 1, &volume, &now));
+    CHECK(isnan(volume) && now == 7.0f);
+    DONE(supple_pressure_set(pressure, 1, 0.0f, 0.0f));
+    /* Millimetres. */
+    REFUSED(SUPPLE_E_POINTS, supple_pressure_init(spare, sizeof spare, scene, in_millimetres(), faces[0], NULL, count, 1, &none, &error));
+    CHECK(error.index < TETS && none == NULL);
 
     DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
     DONE(supple_set_forces(loads, NULL, 0, NULL));
@@ -880,8 +914,6 @@ static void pressures_and_rest(void) {
     DONE(supple_state_reset(state));
     DONE(supple_pressure_now(pressure, state, 0, &before, NULL));
     CHECK(fabs(before / (1e-6 * X * Y * Z) - 1.0) < 1e-4);
-    DONE(supple_pressure_now(pressure, state, 1, &volume, NULL));
-    CHECK(volume == 0.0);
     DONE(supple_set_pressure(loads, pressure));
     DONE(supple_pressure_set(pressure, 0, 2000.0f, 0.0f));
     const float wrong[3] = {0.0f, -1e-5f, NAN};
@@ -897,7 +929,6 @@ static void pressures_and_rest(void) {
     CHECK(supple_settle(scene, loads, state, 1e-5f, 3, NULL, room, enough, &settled) == SUPPLE_BEHIND && settled.steps == 3);
     DONE(supple_settle(scene, loads, state, 1e-5f, 5000, NULL, room, enough, &settled));
     CHECK(settled.remaining < 1e-5f && settled.error.status == SUPPLE_OK);
-    float now = 0.0f;
     DONE(supple_pressure_now(pressure, state, 0, &volume, &now));
     CHECK(now == 2000.0f);
     /* Held at both ends: less than a free body, whose bulk modulus is 120 kPa. */
@@ -970,6 +1001,8 @@ static void contacts(void) {
     REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &made, &error));
     listed.triangles = corners;
     REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], NULL, 8, &made, &error));
+    REFUSED(SUPPLE_E_POINTS, supple_contact_init(memory, bytes, scene, in_millimetres(), &listed, 8, &made, &error));
+    CHECK(error.index < TETS);
     DONE(supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &contact, &error));
 
     const float middle[3] = {-0.0121f, 0.005f * Y, 0.005f * Z};
@@ -987,10 +1020,19 @@ static void contacts(void) {
     list[1].shape = 9;
     REFUSED(SUPPLE_E_CHOICE, supple_set_instruments(contact, list, 2, &error));
     list[1].shape = SUPPLE_FIELD;
-    REFUSED(SUPPLE_E_NULL, supple_set_instruments(contact, list, 2, &error));
+    REFUSED(SUPPLE_E_FIELD, supple_set_instruments(contact, list, 2, &error));
+    CHECK(error.index == 1);
     list[1].field = weights, list[1].field_bytes = sizeof weights;
     REFUSED(SUPPLE_E_FIELD, supple_set_instruments(contact, list, 2, &error));
     CHECK(error.index == 1);
+    /* A quaternion may have any length, but must be one. */
+    static const float lengths[] = {1e-40f, 1e-25f, 1e-10f, 1e10f, 1e38f};
+    for (int n = 0; n < 5; n++) {
+        list[0].pose.rotation[0] = 0.6f * lengths[n], list[0].pose.rotation[3] = 0.8f * lengths[n];
+        DONE(supple_set_instruments(contact, list, 1, &error));
+    }
+    list[0].pose.rotation[1] = INFINITY;
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_set_instruments(contact, list, 1, &error));
     DONE(supple_set_instruments(contact, &ball, 1, &error));
     supple_pose in = start;
     in.position[0] += 0.002f;
@@ -1000,6 +1042,9 @@ static void contacts(void) {
     supple_pose nowhere = in;
     nowhere.position[1] = NAN;
     REFUSED(SUPPLE_E_INSTRUMENT, supple_move_instrument(contact, 0, &nowhere, 0.0, 0.02, &error));
+    nowhere.position[1] = -INFINITY;
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_move_instrument(contact, 0, &nowhere, 0.0, 0.02, &error));
+    CHECK(error.index == 0 && error.value == -INFINITY);
     REFUSED(SUPPLE_E_KIND, supple_set_contact(acts, (supple_contact *)(void *)state));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_contact(small_loads, contact));
     REFUSED(SUPPLE_E_NULL, supple_set_contact(NULL, contact));
@@ -1054,7 +1099,9 @@ static void contacts(void) {
     REFUSED(SUPPLE_E_CAPACITY, supple_grasp(contact, state, 0, 1.0f, &held));
     REFUSED(SUPPLE_E_CAPACITY, supple_grasp(contact, state, 1, 0.001f, &held));
     REFUSED(SUPPLE_E_NOT_FINITE, supple_grasp(contact, state, 0, NAN, &held));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_grasp(contact, state, 0, -0.001f, &held));
     REFUSED(SUPPLE_E_MISMATCH, supple_grasp(contact, small_state, 0, 0.001f, &held));
+    REFUSED(SUPPLE_E_CAPACITY, supple_let_go(contact, 1));
     DONE(supple_grasp(contact, state, 0, 0.003f, &held));
     CHECK(held > 0 && held <= 8);
     supple_pose out_there = start;
@@ -1132,9 +1179,18 @@ static void pulls(void) {
     const float halves[2] = {0.5f, 0.5f};
     REFUSED(SUPPLE_E_INDEX, supple_add_pull_of_nodes(made, scene, corners, halves, 2, &pull, &error));
     CHECK(error.node == NODES);
+    REFUSED(SUPPLE_E_POINTS, supple_add_pull(made, scene, in_millimetres(), &pull, &error));
+    CHECK(error.index < TETS);
     DONE(supple_add_pull(made, scene, points[0], &pull, &error));
-    DONE(supple_add_pull_of_nodes(made, scene, corners, halves, 1, &pull, &error));
-    REFUSED(SUPPLE_E_CAPACITY, supple_add_pull_of_nodes(made, scene, corners, halves, 1, &pull, &error));
+    /* Weights sum up to one. */
+    const uint32_t last[2] = {NODES - 1, NODES - 2};
+    static const float sums[5][2] = {{0.25f, 0.25f}, {-1.0f, -1.0f}, {0.0f, 0.0f}, {1.0f, 1.0f}, {0.502f, 0.5f}}, whole = 1.0f;
+    for (int n = 0; n < 5; n++) {
+        REFUSED(SUPPLE_E_PULL, supple_add_pull_of_nodes(made, scene, last, sums[n], 2, &pull, &error));
+        CHECK(error.index == 1 && error.value == (double)(sums[n][0] + sums[n][1]) && error.limit == 1.0);
+    }
+    DONE(supple_add_pull_of_nodes(made, scene, corners, &whole, 1, &pull, &error));
+    REFUSED(SUPPLE_E_CAPACITY, supple_add_pull_of_nodes(made, scene, corners, &whole, 1, &pull, &error));
     wrong = pull, wrong.most = -1.0f;
     REFUSED(SUPPLE_E_PULL, supple_set_pull(made, 1, &wrong, &error));
     REFUSED(SUPPLE_E_CAPACITY, supple_set_pull(made, 2, &pull, &error));
@@ -1146,6 +1202,11 @@ static void pulls(void) {
     REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, INFINITY, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
     CHECK(error.index == 0);
     REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, 3e6f, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
+    static const double no_times[3][2] = {{NAN, 1.0}, {0.0, NAN}, {0.0, INFINITY}};
+    for (int n = 0; n < 3; n++) {
+        REFUSED(SUPPLE_E_NEGATIVE, supple_set_targets(made, targets[0], 2, no_times[n][0], no_times[n][1], &error));
+        CHECK(error.index == SUPPLE_NONE && error.axis == 2 && !isfinite(error.value));
+    }
     DONE(supple_set_targets(made, targets[0], 2, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_targets_from(made, 1, targets[0], 2, 0.0, 0.01, &error));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_targets_from(made, UINT32_MAX, targets[0], 1, 0.0, 0.01, &error));
@@ -1185,6 +1246,7 @@ static void pulls(void) {
     float turned = -1.0f;
     REFUSED(SUPPLE_E_NULL, supple_turn_pulls(made, scene, NULL, state, &turned));
     REFUSED(SUPPLE_E_MISMATCH, supple_turn_pulls(made, scene, points[0], small_state, &turned));
+    REFUSED(SUPPLE_E_POINTS, supple_turn_pulls(made, scene, in_millimetres(), state, &turned));
     REFUSED(SUPPLE_E_NULL, supple_turn_pulls(NULL, scene, points[0], state, &turned));
     REFUSED(SUPPLE_E_NULL, supple_turn_pulls(made, NULL, points[0], state, &turned));
     DONE(supple_turn_pulls(made, scene, points[0], state, NULL));
@@ -1205,10 +1267,10 @@ static void pulls(void) {
 
     /* Nodes as far away as numbers go. */
     static float far[NODES][3];
-    const float two = 2.0f;
+    const float apart[2] = {2.0f, -1.0f};
     far[NODES - 1][1] = 3e38f;
     DONE(supple_pulls_init(memory, bytes, scene, MOST, ROOM, &made));
-    DONE(supple_add_pull_of_nodes(made, scene, corners, &two, 1, &pull, &error));
+    DONE(supple_add_pull_of_nodes(made, scene, last, apart, 2, &pull, &error));
     DONE(supple_set_displacements(scene, state, far[0], NODES, &error));
     REFUSED(SUPPLE_E_NOT_FINITE, supple_read_pulls(made, state, read, 1));
     DONE(supple_state_reset(state));
@@ -1393,7 +1455,7 @@ int main(int argc, char **argv) {
     relaxing_tissue(config);
     fibrous_tissue(config);
     remarks(config);
-    little_work(&config);
+    settings_and_little_work(&config);
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 

@@ -53,6 +53,8 @@ programs() {
 
     g++ -std=c++17 "${warnings[@]}" tests/hosts/wrapper.cpp "$static" -o "$folder/wrapper"
     "$folder/wrapper" weights/compact-10.weights
+    g++ -std=c++17 "${warnings[@]}" tests/capi/mistakes.cpp "$static" -o "$folder/mistakes"
+    "$folder/mistakes"
 
     # The bar, of which the README has some lines, and what the command makes of the same scene.
     plain() { sed 's,/\*.*\*/,,; s/^ *//; s/ *$//' "$1"; }

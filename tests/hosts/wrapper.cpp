@@ -315,7 +315,7 @@ void simulated(const char *path) {
     EXPECT_SENTENCE(supple::simulation::size(body).error, "fewer bytes or floats than needed: 11, against 12");
     auto wrong = exact;
     wrong.tolerance = -1;
-    EXPECT_SENTENCE(supple::simulation::size(tetrahedron(), wrong).error, "a number is negative or not finite: -1");
+    EXPECT_SENTENCE(supple::simulation::size(tetrahedron(), wrong).error, "a number is negative or not finite: tolerance, -1");
     std::vector<supple::line> memory(supple::lines(bytes.value)), copy(memory.size());
     const auto tight = build(exact, {memory.data(), 640});
     EXPECT(tight.status == status::e_short && tight.error.value == 640 && tight.error.limit == double(few.value));
