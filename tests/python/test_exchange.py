@@ -97,6 +97,35 @@ def test_fields_and_points_are_those_of_what_is_left(soft):
     assert points.distances[0] > 1e-3 and points.distances[1] == 0.0 and not gone[points.elements].any()
 
 
+def test_what_is_written_is_what_is_left(soft, tmp_path):
+    mesh = bar()
+    mesh = supple.Mesh(mesh.points, mesh.tets, regions=np.arange(len(mesh.tets)))
+    simulation = supple.Simulation(scene_of(mesh, soft), gravity=(1.0, 0.0, 0.0))
+    gone = centres(mesh)[:, 2] > 0.03
+    simulation.advance(0.01)
+    simulation.remove(gone)
+    simulation.write(tmp_path / "left.vtu")
+    left = supple.Mesh.read(tmp_path / "left.vtu")
+    assert (left.regions == np.flatnonzero(~gone)).all()
+    assert left.points == pytest.approx(simulation.positions[np.unique(mesh.tets[~gone])], abs=1e-7)
+
+
+@pytest.mark.parametrize("kinds", [3, 6])
+def test_tissues_that_meet_finely_find_their_memory(soft, kinds):
+    """Where elements of a tissue meet in edges and corners only, a node has more neighbours than the size takes for usual."""
+    mesh = bar(cells=(8, 8, 8))
+    region = np.random.default_rng(0).integers(0, kinds, len(mesh.tets))
+    material = [supple.Material.from_moduli(3000.0 + 100.0 * kind, 0.45, density=1000.0) for kind in range(kinds)]
+    mixed = supple.Scene(supple.Mesh(mesh.points, mesh.tets, regions=region), dict(enumerate(material)), fixed=mesh.points[:, 2] < 1e-6)
+    assert supple.Simulation(mixed, gravity=(0.0, 0.0, -1.0)).advance(0.01).ok
+    ablated = supple.Simulation(scene_of(mesh, soft), gravity=(0.0, 0.0, -1.0))
+    for kind in range(1, kinds):
+        ablated.ablate(region == kind, material[kind], 0.001)
+        assert ablated.advance(0.002).ok
+    ablated.exchange(mixed)
+    assert ablated.advance(0.002).ok
+
+
 def test_instruments_and_pulls_follow(soft):
     mesh = bar(cells=(4, 4, 12))
     simulation = supple.Simulation(scene_of(mesh, soft), damping=30.0)

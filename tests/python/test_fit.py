@@ -59,13 +59,17 @@ def model(values):
 BOUNDS = {"young": (0.1, 10.0), "load": (0.1, 10.0), "bend": (-5.0, 5.0)}
 
 
+def fit(simulate, start, measured, **more):
+    return supple.fit(simulate, start, measured, bounds={name: BOUNDS[name] for name in start}, **more)
+
+
 def test_errors_are_those_of_linear_regression():
     """Against closed forms of a linear model: standard errors, correlations, and each point left out by fitting anew without it."""
     measured = model({"young": 2.0, "bend": 1.0}) + np.random.default_rng(2).normal(0.0, 1e-4, (12, 3))
     columns = np.stack([(0.01 * PLACES).ravel(), (1e-3 * PLACES**2).ravel()], axis=1)
     (inverse_young, bend), squares = np.linalg.lstsq(columns, measured.ravel(), rcond=None)[:2]
     covariance = squares[0] / 34 * np.linalg.inv(columns.T @ columns)
-    found = supple.fit(model, {"young": 1.0, "bend": 0.0}, measured, bounds=BOUNDS)
+    found = fit(model, {"young": 1.0, "bend": 0.0}, measured)
     assert found.values["young"] == pytest.approx(1.0 / inverse_young, rel=1e-3)
     assert found.values["bend"] == pytest.approx(bend, rel=1e-2)
     assert found.standard_errors["young"] == pytest.approx(np.sqrt(covariance[0, 0]) / inverse_young**2, rel=0.02)
@@ -73,22 +77,22 @@ def test_errors_are_those_of_linear_regression():
     # Of the value, not of its inverse.
     assert found.correlations[0, 1] == pytest.approx(-covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.02)
     for point in (0, 7):
-        without = supple.fit(model, {"young": 1.0, "bend": 0.0}, measured, bounds=BOUNDS, left_out=[point])
+        without = fit(model, {"young": 1.0, "bend": 0.0}, measured, left_out=[point])
         assert without.left_out_rms == pytest.approx(found.each_left_out[point], rel=0.05)
 
 
 def test_what_the_data_cannot_tell_is_told():
     measured = model({"young": 2.0}) + np.random.default_rng(3).normal(0.0, 1e-4, (12, 3))
-    both = supple.fit(model, {"young": 1.0, "load": 1.0}, measured, bounds=BOUNDS)
+    both = fit(model, {"young": 1.0, "load": 1.0}, measured)
     assert any("cannot tell young from load: their correlation is 1.0" in sentence for sentence in both.cannot_tell), both.cannot_tell
-    idle = supple.fit(lambda values: model({"young": values["young"]}), {"young": 1.0, "bend": 1.0}, measured, bounds=BOUNDS)
+    idle = fit(lambda values: model({"young": values["young"]}), {"young": 1.0, "bend": 1.0}, measured)
     assert idle.cannot_tell == ["bend moves no measured point; measure elsewhere, or leave it out"]
     noisy = measured + np.random.default_rng(4).normal(0.0, 5e-3, (12, 3))
-    loose = supple.fit(model, {"young": 1.0, "bend": 1.0}, noisy, bounds=BOUNDS)
+    loose = fit(model, {"young": 1.0, "bend": 1.0}, noisy)
     assert any("the data cannot tell bend: its standard error" in sentence for sentence in loose.cannot_tell), loose.cannot_tell
-    zero = supple.fit(model, {"young": 1.0, "bend": 1.0}, measured, bounds=BOUNDS)
+    zero = fit(model, {"young": 1.0, "bend": 1.0}, measured)
     assert zero.standard_errors["bend"] > 0.5 * abs(zero.values["bend"]) and zero.cannot_tell == [], zero.cannot_tell
-    places = supple.fit(model, {"young": 1.0}, measured - 0.05, bounds=BOUNDS)
+    places = fit(model, {"young": 1.0}, measured - 0.05)
     assert any("displacements and not places" in sentence for sentence in places.cannot_tell), places.cannot_tell
     limit = supple.fit(model, {"young": 1.0}, measured, bounds={"young": (0.1, 1.5)})
     assert limit.values["young"] == pytest.approx(1.5) and "young stays at its limit, 1.5" in limit.cannot_tell[0]
@@ -102,26 +106,34 @@ def test_values_that_diverge_are_refused_and_displacements_over_time_fitted():
             raise supple.Diverged("too stiff a joke")
         return np.stack([model(values), 0.5 * model(values)])
 
-    found = supple.fit(simulate, {"young": 0.3}, measured, bounds=BOUNDS)
+    found = fit(simulate, {"young": 0.3}, measured)
     assert found.values["young"] == pytest.approx(2.0, rel=1e-3) and found.worst < 1e-5
     with pytest.raises(supple.Diverged):
-        supple.fit(simulate, {"young": 3.0}, measured, bounds=BOUNDS)
+        fit(simulate, {"young": 3.0}, measured)
 
 
 def test_what_cannot_be_fitted_is_refused():
     measured = model({"young": 2.0})
 
-    def refused(words, start={"young": 1.0}, measured=measured, bounds=BOUNDS, simulate=model, left_out=None):
+    def refused(words, start={"young": 1.0}, measured=measured, bounds={"young": BOUNDS["young"]}, simulate=model, left_out=None):
         with pytest.raises(supple.InputError, match=words):
             supple.fit(simulate, start, measured, bounds=bounds, left_out=left_out)
 
     refused("start of young: 20.0, it must be from 0.1 to 10.0", start={"young": 20.0})
     refused("bounds of young: 2.0 and 1.0, the first must be below", bounds={"young": (2.0, 1.0)})
     refused("bounds: young has none", bounds={})
-    refused("start: it is empty", start={})
+    refused("start: it is empty", start={}, bounds={})
     refused(r"measured: its shape is \(12,\)", measured=measured[:, 0])
     refused(r"simulate: the displacement of point 2 is .*nan.* with young = ", simulate=lambda values: np.where(np.arange(12)[:, None] == 2, np.nan, model(values)))
     refused(r"simulate: its displacements are of shape \(11, 3\)", simulate=lambda values: model(values)[1:])
+    refused("start of young '1.0': it must be a number", start={"young": "1.0"})
+    refused(r"start \['young'\]: it must give a first value to each name", start=["young"])
+    refused("bounds of young: -1.0 and 10.0, the first must be zero or more", bounds={"young": (-1.0, 10.0)})
+    refused("bounds of young: 5, they must be two numbers, the least and the most", bounds={"young": 5})
+    refused("bounds: yuong is none of the names of start, young", bounds={"young": (0.1, 10.0), "yuong": (0.1, 10.0)})
+    refused("measured 'a': it must be displacements", measured="a")
+    endless = np.where(np.arange(12)[:, None] == 3, np.inf, measured)
+    refused(r"measured: the displacement of point 3 is \[inf, .*\]: where nothing was measured give NaN", measured=endless)
     refused("left_out: .*, there are points 0 to 11", left_out=[12])
     refused("1 values, but only 0 measured numbers", left_out=np.ones(12, bool))
 

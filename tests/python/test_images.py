@@ -187,9 +187,11 @@ def test_a_tumour_in_an_image_goes_where_its_points_go(sagged, tmp_path):
 def test_grids_that_cannot_be_are_refused_in_words(sagged):
     good = grid_around(sagged, 5.0)
     for change, words in [
-        ({"spacing": (1.0, 0.0, 1.0)}, "the grid: the grid of an image that cannot be.*axis y"),
-        ({"direction": ((1.0, 0.2, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}, "cannot be: .*directions"),
-        ({"size": (0, 5, 5)}, "cannot be: .*number of points"),
+        ({"spacing": (1.0, 0.0, 1.0)}, r"the grid: spacing \(1.0, 0.0, 1.0\): they must be three positive numbers, mm"),
+        ({"spacing": 2.0}, "the grid: spacing 2.0: "),
+        ({"origin": (np.nan, 0.0, 0.0)}, r"the grid: origin \(nan, 0.0, 0.0\): they must be three finite numbers, mm"),
+        ({"direction": ((1.0, 0.2, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}, r"the grid: direction \(\(1.0, 0.2, .*: resample the image"),
+        ({"size": (0, 5, 5)}, r"the grid: size \(0, 5, 5\): whole numbers of points are needed, at least 1"),
         ({"size": (5.5, 5, 5)}, "whole numbers of points are needed"),
         ({"origin": (1000.0, 0.0, 0.0)}, r"no point of the grid is within the tissue, which lies from .* mm \(LPS\): is the mesh in metres"),
     ]:
@@ -199,7 +201,9 @@ def test_grids_that_cannot_be_are_refused_in_words(sagged):
     for asked, words in [
         ({"kind": "backward"}, "kind 'backward': there are forward, inverse"),
         ({"axes": "LAS"}, "axes 'LAS': there are LPS, RAS"),
-        ({"reach": -1.0}, r"reach -1.0: a number from 0 \(none\) on is needed, mm"),
+        ({"reach": -1.0}, "reach -1.0: it must be zero or a positive number, mm"),
+        ({"reach": "5"}, "reach '5': it must be a number"),
+        ({"axes": 1}, "axes 1: there are LPS, RAS"),
     ]:
         with pytest.raises(supple.InputError, match=words):
             sagged.field(good, **asked)
@@ -276,6 +280,25 @@ def test_tissue_that_moves_across_the_border_of_an_image_is_told(sagged, tmp_pat
     assert done.returncode == 0 and done.stderr.startswith(words), done.stderr
     # At least so many labels are gone.
     assert (sitk.GetArrayFromImage(sitk.ReadImage(files[1])) == 0).sum() >= from_outside.sum()
+
+
+def test_an_image_that_goes_on_beyond_the_field_is_warned_of():
+    """A field of the lower half of a body that moves by 10 mm, and an image of all of it: above the field nothing would move."""
+    mesh = supple.Mesh.box((0.04, 0.04, 0.08), (4, 4, 8))
+    moved = np.tile([0.010, 0.0, 0.0], (len(mesh.points), 1))
+    whole, half = (supple.Grid((0.5, 0.5, 0.5), (1.0, 1.0, 1.0), (60, 40, count)) for count in (80, 40))
+    image = image_of(whole, np.zeros((80, 40, 60), np.float32))
+    words = "the image goes on 40 mm beyond the grid of the field, at whose border it moves by 10 mm: .*; make the field on the grid of the image"
+    with pytest.warns(RuntimeWarning, match=words):
+        supple.displacement_field(mesh, moved, half).warp(image)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        supple.displacement_field(mesh, moved, whole).warp(image)
+        supple.displacement_field(mesh, moved, whole.coarser(3)).warp(image)
+        # Where the field has ended, nothing is lost.
+        around = supple.Grid((-40.0, -40.0, -40.0), (2.0, 2.0, 2.0), (60, 60, 81))
+        wide = supple.Grid((-80.0, -80.0, -80.0), (4.0, 4.0, 4.0), (50, 50, 60))
+        supple.displacement_field(mesh, moved, around, reach=25.0).warp(image_of(wide, np.zeros((60, 50, 50), np.float32)))
 
 
 def test_complex_images_are_refused_in_words(sagged):

@@ -1,6 +1,8 @@
 """The package itself: views without copies, errors that name place and value, files, threads, the ten lines of its docstring."""
 
+import copy
 import gc
+import pickle
 import threading
 import time
 import warnings
@@ -24,6 +26,47 @@ def test_displacements_are_a_view_that_stays_sound(soft):
     del simulation
     gc.collect()
     assert view[:, 2].mean() == fallen
+
+
+def test_the_arrays_of_a_mesh_stay_as_they_are(soft):
+    tets, regions = bar().tets.copy(), np.arange(len(bar().tets), dtype=np.int32)
+    mesh = supple.Mesh(bar().points.copy(), tets, regions=regions)
+    for kept in (mesh.points, mesh.tets, mesh.regions):
+        with pytest.raises(ValueError, match="read-only"):
+            kept *= 2
+    # Arrays of the caller are still the caller's.
+    tets[:], regions[:] = 0, 0
+    assert (mesh.tets == bar().tets).all() and (mesh.regions == np.arange(len(tets))).all()
+
+
+def test_what_does_nothing_cannot_be_assigned(soft):
+    mesh = bar()
+    scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6)
+    simulation = supple.Simulation(scene)
+    pressure, pulls = simulation.add_pressure(mesh.boundary(), 0.0), simulation.pull(mesh.points[-1:])
+    for thing, name in [
+        *((simulation, name) for name in ("damping", "step", "tolerance", "gravty", "scene", "method", "displacements")),
+        *((scene, name) for name in ("fixed", "element", "mesh", "facts")),
+        *((mesh, name) for name in ("points", "tets", "regions", "scale")),
+        *((soft, name) for name in ("density", "law", "young")),
+        (pressure, "ramp"), (pulls, "stiffness"), (supple.LocalForce(), "stifness"),
+        (simulation.reaction([0]), "damping"), (simulation.locate([[0.0, 0.0, 0.0]]), "rest"),
+    ]:  # fmt: skip
+        with pytest.raises(AttributeError, match=f"{type(thing).__name__}.{name} cannot be set") as caught:
+            setattr(thing, name, 20.0)
+    print(caught.value)
+    with pytest.raises(AttributeError, match="Simulation.damping cannot be set, only gravity: make a new Simulation"):
+        simulation.damping = 20.0
+    with pytest.raises(ValueError, match="read-only"):
+        simulation.gravity[0] = 1.0
+    simulation.gravity, pressure.pascal = (1.0, 0.0, 0.0), 5.0
+    assert simulation.gravity.tolist() == [1.0, 0.0, 0.0] and pressure.pascal == 5.0
+    # Copies, and what other processes get.
+    assert copy.deepcopy(soft).density == soft.density and (pickle.loads(pickle.dumps(mesh)).tets == mesh.tets).all()
+
+
+def test_the_version_is_that_of_the_kernel():
+    assert supple.__version__ == supple.version()
 
 
 def test_the_ten_lines_of_the_docstring_run(tmp_path, monkeypatch):
@@ -105,11 +148,15 @@ REFUSED = [
     (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], moved=[0]), "node 0 is both"),
     (lambda mesh, soft: supple.Scene(mesh, soft, element="cubic"), "element 'cubic'"),
     (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], axes="xw"), "axes 'xw'"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], axes=1), "fixed: axes 1, they are letters of 'xyz'"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], axes=["xy"]), r"fixed: axes \['xy'\], they are letters"),
     (lambda mesh, soft: supple.Scene(mesh, soft, fixed=range(144)), "the scene: "),
     (lambda mesh, soft: supple.Material("neo-hookean", c=1.0, density=1.0), "c are given, c, d are needed"),
     (lambda mesh, soft: supple.Material("rubber", density=1.0), "law 'rubber'"),
     (lambda mesh, soft: supple.Scene(mesh, supple.Material("neo-hookean", c=-1.0, d=1.0, density=1.0)), "the scene: .* value -1"),
-    (lambda mesh, soft: supple.Material.from_moduli(1e3, 0.5, density=1.0), "Poisson's ratio 0.5"),
+    (lambda mesh, soft: supple.Material.from_moduli(1e3, 0.5, density=1.0), "Poisson's ratio 0.5: it must be above -1 and below 0.5"),
+    (lambda mesh, soft: supple.Material.from_moduli(1e3, -2.0, density=1.0), "Poisson's ratio -2.0: it must be above -1 and below 0.5"),
+    (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets, regions=[1 << 40] * len(mesh.tets)), "regions: element 0 is of 1099511627776, .* 32 bits"),
 ]
 
 
@@ -233,6 +280,15 @@ SIMULATED = [
     (lambda scene, sim: sim.pull([[0.01, 0.01, 0.08]] * 2, stiffness=[100.0, -5.0]), "stiffness of row 1: -5 N/m, it must be from 0 to 1e\\+06"),
     (lambda scene, sim: supple.Material.from_moduli(0.0, 0.3, density=1000.0), "Young's modulus 0.0: it must be a positive number"),
     (lambda scene, sim: sim.set_instruments([supple.Instrument.sphere("1", [0, 0, 0.2])]), "radius '1': it must be a number"),
+    (lambda scene, sim: sim.set_instruments([supple.Instrument.sphere(0, [0, 0, 0.2])]), "instruments: entry 0: radius 0: it must be a positive number, m"),
+    (lambda scene, sim: sim.set_instruments([supple.Instrument.capsule(0.01, -1, [0, 0, 0.2])]), "instruments: entry 0: length -1: it must be a positive number, m"),
+    (lambda scene, sim: sim.set_instruments([supple.Instrument.plane([0, 0, -0.2], friction=-1)]), "instruments: entry 0: friction -1: it must be zero or a positive number"),
+    (lambda scene, sim: sim.set_motions([], np.zeros((0, 3)), axes=1), "motions: axes 1, they are letters of 'xyz'"),
+    (lambda scene, sim: sim.restore("x"), "restore 'x': it must be the bytes that save gave"),
+    (lambda scene, sim: sim.restore(None), "restore None: it must be the bytes that save gave"),
+    (lambda scene, sim: sim.restore(sim.save()[:-8]), r"restore of 7048 bytes, where save gives 7056: fewer"),
+    (lambda scene, sim: sim.add_pressure(scene.mesh.boundary(), np.nan), "pressure nan Pa, ramp 0.0 s: a number is not finite"),
+    (lambda scene, sim: sim.reaction([]), "reaction: there are no nodes: name some that the scene fixes or moves"),
     (lambda scene, sim: sim.exchange(scene.mesh), "exchange with <supple.Mesh: .*: it must be a Scene"),
     (lambda scene, sim: sim.ablate([0], 1e4, 1.0), "ablate to 10000.0: it must be a Material"),
     (lambda scene, sim: sim.reaction([0, 20]), "reaction: entry 1 is node 20, which the scene neither fixes nor moves"),

@@ -133,6 +133,16 @@ def test_pressures_let_go_of_what_is_removed():
     cut.add_pressure(sides[:1], 1.0)
 
 
+def test_a_surface_that_is_open_has_no_volume():
+    simulation = held()
+    mesh = simulation.scene.mesh
+    faces = mesh.boundary()
+    part, whole = simulation.add_pressure(faces[1:], 0.0), simulation.add_pressure(faces, 7.0)
+    assert np.isnan(part.volume) and whole.volume == pytest.approx(mesh.volumes.sum(), rel=1e-5)
+    simulation.remove(mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.6 * mesh.points[:, 0].max())
+    assert np.isnan(whole.volume) and whole.now == 7.0
+
+
 @pytest.mark.parametrize("way", ["remove", "exchange"])
 def test_tractions_let_go_of_what_is_removed(way):
     """The end of a bar is pulled, and half of it goes: the supports bear traction times the area that is left."""

@@ -43,3 +43,6 @@ def version() -> str:
     from ._library import ffi
 
     return str(ffi.string(_lib.supple_version()), "ascii")
+
+
+__version__ = version()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import pathlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,12 @@ if lib.supple_abi() != lib.SUPPLE_ABI:
     raise ImportError(f"libsupple.so has interface {lib.supple_abi()}, the package is for {lib.SUPPLE_ABI}")
 # Statuses of steps that were refused.
 _DIVERGED = range(lib.SUPPLE_E_DIVERGED_PRESSURE, lib.SUPPLE_E_DIVERGED + 1)
-# Of which an axis is a term.
-_OF_TERMS = (lib.SUPPLE_E_RELAXATION_SHARE, lib.SUPPLE_E_RELAXATION_TIME, lib.SUPPLE_E_FIBRES)
+# What an axis is where it is none.
+_TERMS = ("term 0", "term 1", "term 2")
+_AXES = {
+    **dict.fromkeys((lib.SUPPLE_E_RELAXATION_SHARE, lib.SUPPLE_E_RELAXATION_TIME, lib.SUPPLE_E_FIBRES), _TERMS),
+    lib.SUPPLE_E_NEGATIVE: ("tolerance", "damping", "time"),
+}
 
 
 def words(status: int) -> str:
@@ -47,7 +51,7 @@ def _refusal(status: int, words: str, error: Any, what: str) -> errors.Error:
         if "node" in found:
             parts.append(f"node {found['node']}")
         if "axis" in found:
-            parts.append(f"term {found['axis']}" if status in _OF_TERMS else f"axis {'xyz'[found['axis'] % 3]}")
+            parts.append(_AXES.get(status, ("axis x", "axis y", "axis z"))[found["axis"] % 3])
         if not math.isnan(error.value) and (error.value != 0.0 or error.limit != 0.0):
             found["value"] = float(error.value)
             parts.append(f"value {error.value:.6g}")
@@ -57,6 +61,24 @@ def _refusal(status: int, words: str, error: Any, what: str) -> errors.Error:
     sentence = ": ".join(part for part in (what, words, ", ".join(parts)) if part)
     kind = errors.UnstableStep if status == lib.SUPPLE_E_UNSTABLE else errors.Diverged if status in _DIVERGED else errors.InputError
     return kind(sentence, status, **found)
+
+
+class Sealed:
+    """An object of which, once it is made, only what has a setter can be set: nothing would read anything else."""
+
+    _is_made = False
+
+    # Type checkers know the names by themselves.
+    if not TYPE_CHECKING:
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if self._is_made and not name.startswith("_"):
+                kind = type(self)
+                settable = [each for each in dir(kind) if getattr(getattr(kind, each), "fset", None)]
+                if name not in settable:
+                    only, made = f", only {', '.join(settable)}" if settable else "", kind.__name__
+                    raise AttributeError(f"{made}.{name} cannot be set{only}: make a new {made} with it, or call a method")
+            super().__setattr__(name, value)
 
 
 class Memory:

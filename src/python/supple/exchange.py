@@ -62,7 +62,7 @@ def exchanged(simulation: Simulation, scene: Scene) -> None:
     library.checked(lib.supple_sim_carry_on(sim, simulation._sim, settings, error), error, "exchange")
     if contact is not None and contact.list:
         library.checked(lib.supple_set_contact(objects.loads, contact.raw))
-    simulation.scene, simulation._contact = scene, contact
+    simulation._scene, simulation._contact = scene, contact
     simulation._adopt(memory, sim)
     _load_what_is_left(simulation)
 
@@ -78,7 +78,8 @@ def _load_what_is_left(simulation: Simulation) -> None:
             triangles = one._numbers.reshape(-1, 3)
             is_left = scene._are_of_boundary(triangles)
             if not is_left.all():
-                one._numbers, one._filling = triangles[is_left].ravel(), (0.0, 0.0)
+                one._cover(triangles[is_left].ravel())
+                one._filling = (0.0, 0.0)
         simulation._set_pressures(simulation._pressures)
 
 
@@ -129,4 +130,4 @@ def next_stage(simulation: Simulation) -> None:
     for ablation in due:
         ablation.stage = ablation.stage_at(now)
     simulation._ablations = [ablation for ablation in simulation._ablations if ablation.stage < _STAGES]
-    simulation.scene = simulation.scene._of_tissues(tissues)
+    simulation._scene = simulation.scene._of_tissues(tissues)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _library as library
 from .errors import Error, InputError
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,8 @@ _MOST_CORRELATION = 0.98
 _LOOSE = 0.1
 _SAME = 0.9999
 _MOST_MISSED = 1.0 / 3.0
+# Names that end so are of what displacements are inverse to.
+_INVERSE = ("young", "stiffness")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,15 +131,29 @@ class _Problem:
         bounds: Mapping[str, tuple[float, float]],
         left_out: ArrayLike | None,
     ) -> None:
+        if not isinstance(start, Mapping):
+            raise InputError(f"start {start!r}: it must give a first value to each name: {{'young': 8e3}}")
+        if not isinstance(bounds, Mapping):
+            raise InputError(f"bounds {bounds!r}: they must give the least and the most to each name: {{'young': (1e3, 1e5)}}")
         self.simulate, self.names, self.done = simulate, list(start), dict[bytes, Floats]()
-        self.measured = np.array(measured, np.float64)
+        try:
+            self.measured = np.array(measured, np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"measured {measured!r:.40}: it must be displacements, m, (points, 3) or (times, points, 3)") from None
         if self.measured.ndim not in (2, 3) or self.measured.shape[-1] != 3:
             raise InputError(f"measured: its shape is {self.measured.shape}, it must be (points, 3) or (times, points, 3)")
         if not self.names:
             raise InputError("start: it is empty; name at least one value")
-        self.limits = np.array([self._limits(name, start[name], bounds) for name in self.names])
-        first = np.array([float(start[name]) for name in self.names])
-        self.is_inverse = np.array([name.endswith(("young", "stiffness")) for name in self.names]) & (self.limits[:, 0] > 0.0)
+        bad = np.argwhere(np.isinf(self.measured).any(axis=-1))
+        if len(bad):
+            wrong = self.measured[tuple(bad[0])].tolist()
+            raise InputError(f"measured: the displacement of point {bad[0][-1]} is {wrong}: where nothing was measured give NaN")
+        others = [name for name in bounds if name not in start]
+        if others:
+            raise InputError(f"bounds: {others[0]} is none of the names of start, {', '.join(self.names)}: leave it out, or mend its name")
+        first = np.array([library.number(start[name], f"start of {name}") for name in self.names])
+        self.limits = np.array([self._limits(name, value, bounds) for name, value in zip(self.names, first.tolist())])
+        self.is_inverse = np.array([name.endswith(_INVERSE) for name in self.names]) & (self.limits[:, 0] > 0.0)
         # Each coordinate is 1 at the start.
         self.unit = np.where(first == 0.0, np.ptp(self.limits, axis=1), np.abs(first))
         self.first, self.start = first, np.ones(len(first))
@@ -160,12 +177,17 @@ class _Problem:
     def _limits(name: str, first: float, bounds: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
         if name not in bounds:
             raise InputError(f"bounds: {name} has none; give the least and the most")
-        least, most = bounds[name]
+        try:
+            least, most = (library.number(each, "bound") for each in bounds[name])
+        except (TypeError, ValueError):
+            raise InputError(f"bounds of {name}: {bounds[name]!r}, they must be two numbers, the least and the most") from None
+        if name.endswith(_INVERSE) and least < 0.0:
+            raise InputError(f"bounds of {name}: {least} and {most}, the first must be zero or more")
         if not (np.isfinite(least) and np.isfinite(most) and least < most):
             raise InputError(f"bounds of {name}: {least} and {most}, the first must be below the second")
         if not least <= first <= most:
             raise InputError(f"start of {name}: {first}, it must be from {least} to {most}")
-        return float(least), float(most)
+        return least, most
 
     def coordinates(self, values: Floats) -> Floats:
         # No inverse is taken of what may be zero.

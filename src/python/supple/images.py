@@ -32,6 +32,10 @@ _MOST_POINTS = 1 << 24
 # times the displacement over the rest of the reach; from 1 on it folds.
 _STEEPEST = 1.54
 _CELL = 1 / 8
+# How far directions may be from being orthonormal, as the kernel has it.
+_ORTHONORMAL = 1e-3
+# What an image shows of a motion that ends at a border, mm.
+_VISIBLE = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,14 +76,26 @@ class Grid:
         places: NDArray[np.float64] = (index * self.spacing) @ np.asarray(self.direction, np.float64).T + self.origin
         return places
 
+    def _index_of(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where places (mm, LPS, (.., 3)) are along its axes, from its first point on, in spacings."""
+        index: NDArray[np.float64] = (places - self.origin) @ np.asarray(self.direction) / self.spacing
+        return index
+
     def _raw(self, signs: NDArray[np.float64]) -> Any:
         """As the kernel has it: metres, in the axes of the mesh."""
         made = ffi.new("supple_image_grid *")
-        origin, spacing, size, direction = (np.asarray(getattr(self, field.name)) for field in dataclasses.fields(self))
-        if origin.shape != (3,) or spacing.shape != (3,) or size.shape != (3,) or direction.shape != (3, 3):
-            raise InputError(f"{self}: three numbers each are needed, and three rows of three directions")
-        if not np.issubdtype(size.dtype, np.integer) or size.min() < 0 or size.max() >= 1 << 32:
-            raise InputError(f"size {self.size}: whole numbers of points are needed")
+        origin, spacing, direction = (_numbers(each) for each in (self.origin, self.spacing, self.direction))
+        if origin.shape != (3,) or not np.isfinite(origin).all():
+            raise InputError(f"the grid: origin {self.origin}: they must be three finite numbers, mm")
+        if spacing.shape != (3,) or not ((spacing > 0.0) & (spacing < np.inf)).all():
+            raise InputError(f"the grid: spacing {self.spacing}: they must be three positive numbers, mm")
+        if direction.shape != (3, 3) or not (np.abs(direction.T @ direction - np.eye(3)) <= _ORTHONORMAL).all():
+            raise InputError(
+                f"the grid: direction {self.direction}: columns must be of length 1 and at right angles, to a thousandth: resample the image"
+            )
+        size = np.asarray(self.size)
+        if size.shape != (3,) or not np.issubdtype(size.dtype, np.integer) or size.min() < 1 or size.max() >= 1 << 32:
+            raise InputError(f"the grid: size {self.size}: whole numbers of points are needed, at least 1")
         made.origin, made.spacing = (1e-3 * signs * origin).tolist(), (1e-3 * spacing).tolist()
         made.size, made.direction = size.tolist(), (signs[:, None] * direction).tolist()
         return made
@@ -127,8 +143,36 @@ class Field:
         sitk = _simple_itk()
         if "complex" in image.GetPixelIDTypeAsString():
             raise InputError("the image has complex values, which have no order: warp its real and its imaginary part by themselves")
+        beyond, lost = self._lost(Grid.of(image))
+        if lost > _VISIBLE:
+            warnings.warn(
+                f"the image goes on {beyond:.3g} mm beyond the grid of the field, at whose border it moves by {lost:.3g} mm: "
+                "beyond it nothing moves; make the field on the grid of the image, or with a reach that ends within its own",
+                RuntimeWarning, stacklevel=2,
+            )  # fmt: skip
         outside = 0.0 if labels else float(np.fmin.reduce(sitk.GetArrayViewFromImage(image), axis=None))
         return sitk.Resample(image, image, self.transform(), sitk.sitkNearestNeighbor if labels else sitk.sitkLinear, outside)
+
+    def _lost(self, image: Grid) -> tuple[float, float]:
+        """How far an image goes on beyond the grid, and how far the field moves there the border that is within the image, at most; mm."""
+        grid, beyond, lost = self.grid, 0.0, 0.0
+        lengths = tuple((count - 1) * each for count, each in zip(image.size, image.spacing))
+        ends = dataclasses.replace(image, spacing=lengths, size=(2, 2, 2))
+        of_ends = grid._index_of(ends.points()).reshape(-1, 3)
+        for axis in range(3):
+            last = grid.size[axis] - 1
+            for side, over in ((0, -of_ends[:, axis].min()), (last, of_ends[:, axis].max() - last)):
+                # ITK goes on for half a voxel.
+                if over <= 0.5 + _ORTHONORMAL:
+                    continue
+                origin = np.asarray(grid.origin) + side * grid.spacing[axis] * np.asarray(grid.direction)[:, axis]
+                size = tuple(1 if each == axis else grid.size[each] for each in range(3))
+                index = image._index_of(dataclasses.replace(grid, origin=tuple(origin), size=size).points())
+                is_seen = ((index >= -0.5) & (index <= np.asarray(image.size) - 0.5)).all(axis=-1)
+                moved = np.linalg.norm(np.take(self.values, [side], axis=2 - axis)[is_seen], axis=-1).max(initial=0.0)
+                if moved > lost:
+                    beyond, lost = float(over * grid.spacing[axis]), float(moved)
+        return beyond, lost
 
 
 def displacement_field(
@@ -144,11 +188,10 @@ def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, fl
     """The same of vectors as the kernel has them, of which the largest is so long (m)."""
     image, kind, reach, axes = asked
     for value, known, what in ((kind, _KINDS, "kind"), (axes, _SIGNS, "axes")):
-        if value not in known:
+        if not isinstance(value, str) or value not in known:
             raise InputError(f"{what} {value!r}: there are {', '.join(known)}")
-    if not (np.isfinite(reach) and reach >= 0.0):
-        raise InputError(f"reach {reach}: a number from 0 (none) on is needed, mm")
-    grid, signs = Grid.of(image), _SIGNS[axes]
+    reach, grid, signs = library.not_negative(reach, "reach", "mm"), Grid.of(image), _SIGNS[axes]
+    raw = grid._raw(signs)
     rest = _STEEPEST * 1e3 * largest
     least = max(rest / (1.0 - _CELL), rest + max(grid.spacing))
     if 0.0 < reach < least:
@@ -157,7 +200,7 @@ def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, fl
             f"from {least:.3g} mm on it does not",
             RuntimeWarning, stacklevel=3,
         )  # fmt: skip
-    raw, error, bytes_needed = grid._raw(signs), library.new_error(), ffi.new("size_t *")
+    error, bytes_needed = library.new_error(), ffi.new("size_t *")
     library.checked(lib.supple_displacement_field_size(raw, 1e-3 * reach, bytes_needed, error), error, "the grid")
     scratch, covered = library.Memory(bytes_needed[0]), ffi.new("size_t *")
     values = np.empty((*reversed(grid.size), 3), np.float32)
@@ -185,7 +228,7 @@ def points_from_outside(mesh: Mesh, field: Field, image: Any, axes: str) -> int:
     for layer, values in enumerate(field.values):
         origin = np.asarray(grid.origin) + layer * grid.spacing[2] * np.asarray(grid.direction)[:, 2]
         places = dataclasses.replace(grid, origin=tuple(origin), size=(*grid.size[:2], 1)).points()[0] + values
-        voxels = (places - of_image.origin) @ np.asarray(of_image.direction) / of_image.spacing
+        voxels = of_image._index_of(places)
         is_outside = ((voxels < -0.5) | (voxels > np.asarray(of_image.size) - 0.5)).any(axis=-1)
         is_near = ((places >= low) & (places <= high)).all(axis=-1)
         there = places[is_outside & is_near]
@@ -214,6 +257,14 @@ def write_image(image: Any, path: str | os.PathLike[str]) -> None:
     """Writes an image to a file, compressed, by SimpleITK."""
     sitk = _simple_itk()
     _by_simple_itk(path, "write", lambda: sitk.WriteImage(image, str(path), True))
+
+
+def _numbers(given: Any) -> NDArray[np.float64]:
+    """As an array; of no shape where it is none of numbers."""
+    try:
+        return np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
 
 
 def _by_simple_itk(path: str | os.PathLike[str], what: str, do: Any) -> Any:

@@ -13,6 +13,10 @@ from ._library import ffi, lib
 from .errors import InputError
 
 
+# What a shape cannot be without.
+_SIZES = {lib.SUPPLE_SPHERE: ("radius",), lib.SUPPLE_CAPSULE: ("radius", "length")}
+
+
 @dataclasses.dataclass(frozen=True)
 class Instrument:
     """A rigid body at a position (m), turned by a quaternion x, y, z, w. Made by `sphere`, `capsule`, `plane` and `field`.
@@ -87,12 +91,13 @@ POINT = np.dtype(
 )
 
 
-class LocalForce:
+class LocalForce(library.Sealed):
     """The force on an instrument between two frames, for a haptic loop: a stiffness that `follow` learns from each frame. `at` may be
     called from any thread, as often as you like."""
 
     def __init__(self) -> None:
         self._model = ffi.new("supple_local_force *")
+        self._is_made = True
 
     def follow(self, position: ArrayLike, force: ArrayLike) -> None:
         """After a frame: where the instrument is (m), and the force on it (N), such as `Touch.force`."""
@@ -132,10 +137,15 @@ class Rows:
                 raise InputError(f"instruments: entry {index} is {each!r}, an Instrument is needed", index=index)
         self.list, self.fields = list(instruments), list[NDArray[np.uint8]]()
         self.raw = ffi.new("supple_instrument[]", max(len(instruments), 1))
-        for row, each in zip(self.raw, instruments):
+        for index, (row, each) in enumerate(zip(self.raw, instruments)):
             row.shape = each.shape
             for name in ("radius", "length", "friction"):
-                setattr(row, name, library.number(getattr(each, name), name))
+                value = library.number(getattr(each, name), name)
+                is_size = name in _SIZES.get(each.shape, ())
+                if not (value > 0.0 if is_size else value >= 0.0) or value == np.inf:
+                    wanted = "a positive number, m" if is_size else "zero or a positive number"
+                    raise InputError(f"instruments: entry {index}: {name} {value:g}: it must be {wanted}", index=index)
+                setattr(row, name, value)
             row.pose = _pose(each.position, each.rotation)[0]
             if each.distances is not None:
                 memory = library.Memory(len(each.distances))

@@ -19,9 +19,9 @@ _OWN = (".vtk", ".vtu", ".msh", ".node", ".ele")
 _Result = TypeVar("_Result")
 
 
-class Mesh:
+class Mesh(library.Sealed):
     """Points (m) of shape (n, 3), the four nodes of each tetrahedron, of shape (m, 4), from zero, and of what region each tetrahedron
-    is, integers of shape (m,), or None.
+    is, integers of shape (m,), or None. They are copied, and read-only: what is made of a mesh keeps it.
 
     `scale` makes metres of the points: 0.001 for a mesh in millimetres.
     """
@@ -36,8 +36,12 @@ class Mesh:
         bad = np.flatnonzero(((array < 0) | (array >= len(self.points))).any(axis=1))
         if len(bad):
             raise InputError(f"tets: element {bad[0]} has nodes {array[bad[0]].tolist()}, there are {len(self.points)} nodes")
-        self.tets: NDArray[np.uint32] = np.ascontiguousarray(array, np.uint32)
+        self.tets: NDArray[np.uint32] = np.array(array, np.uint32, order="C")
         self.regions = None if regions is None else _regions(regions, len(self.tets))
+        for kept in (self.points, self.tets, self.regions):
+            if kept is not None:
+                kept.flags.writeable = False
+        self._is_made = True
 
     @classmethod
     def box(cls, size: ArrayLike, cells: ArrayLike) -> Mesh:
@@ -120,7 +124,11 @@ def _regions(regions: ArrayLike, elements: int) -> NDArray[np.int32]:
     array = np.asarray(regions)
     if array.shape != (elements,) or not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"regions: {array.dtype} of shape {array.shape}, they must be integers of shape ({elements},)")
-    return array.astype(np.int32)
+    made = array.astype(np.int32)
+    bad = np.flatnonzero(made != array)
+    if len(bad):
+        raise InputError(f"regions: element {bad[0]} is of {array[bad[0]]}, numbers of regions must fit in 32 bits: give smaller ones")
+    return made
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.int32] | None]:

@@ -34,7 +34,7 @@ def _located(mesh: Mesh, places: ArrayLike) -> NDArray[np.void]:
     return found
 
 
-class FollowedPoints:
+class FollowedPoints(library.Sealed):
     """Points of the tissue; made by `Simulation.locate`. Those outside follow the nearest point of it.
 
     Attributes
@@ -54,6 +54,7 @@ class FollowedPoints:
         self.distances: NDArray[np.float32] = self._points["distance"]
         self.elements: NDArray[np.uint32] = self._points["element"]
         self.weights: NDArray[np.float32] = self._points["weights"]
+        self._is_made = True
 
     def __len__(self) -> int:
         return len(self._points)

@@ -107,11 +107,12 @@ class PullMemory:
         return found
 
 
-class Pulls:
+class Pulls(library.Sealed):
     """Pulls that were made together, by `Simulation.pull`."""
 
     def __init__(self, simulation: Simulation, wanted: Wanted) -> None:
         self._simulation, self._wanted = simulation, wanted
+        self._is_made = True
 
     def move(self, targets: ArrayLike, *, within: float = 0.0) -> None:
         """Sets all targets, m, of shape (n, 3); a row with a NaN is absent until it has one again. Targets that were there move evenly to

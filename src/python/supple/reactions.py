@@ -25,7 +25,7 @@ class ReactionForce:
     spread: float
 
 
-class Reaction:
+class Reaction(library.Sealed):
     """What tells the force of some supports; made by `Simulation.reaction` before the steps that it is to tell of."""
 
     def __init__(self, simulation: Simulation, nodes: NDArray[np.uint32], damping: float) -> None:
@@ -39,6 +39,7 @@ class Reaction:
         library.checked(status, error, "reaction")
         self._raw = made[0]
         self.force()
+        self._is_made = True
 
     def force(self) -> ReactionForce | None:
         """The mean force since the last call, to be asked for after each frame; None after a reset or a restore."""

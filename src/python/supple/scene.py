@@ -27,12 +27,12 @@ ELEMENTS = {"linear": lib.SUPPLE_LINEAR, "nodal-pressure": lib.SUPPLE_NODAL_PRES
 
 def axes_of(axes: str, what: str) -> int:
     """Bits of "xyz"."""
-    if not axes or any(axis not in "xyz" for axis in axes):
-        raise InputError(f"{what}: axes {axes!r}, they are of x, y and z")
+    if not isinstance(axes, str) or not axes or any(axis not in "xyz" for axis in axes):
+        raise InputError(f"{what}: axes {axes!r}, they are letters of 'xyz'")
     return sum(1 << "xyz".index(axis) for axis in set(axes))
 
 
-class Material:
+class Material(library.Sealed):
     """A law with its constants (Pa) and a density (kg/m^3): `Material("neo-hookean", c=1034, d=10000, density=1060)`.
 
     With `prony=[[0.5, 1.0], [0.2, 30.0]]` it relaxes: of the stress that changes the shape a share of 0.5 with the time 1 s, 0.2 with 30 s.
@@ -62,6 +62,7 @@ class Material:
         self.constants = {name: library.number(constants[name], name) for name in names}
         self.prony = _terms_of(prony)
         self.fibres, self.sheets, self.coupling = (_term_of(each, name) for each, name in zip((fibres, sheets, coupling), _TERMS))
+        self._is_made = True
 
     @classmethod
     def from_moduli(
@@ -80,7 +81,7 @@ class Material:
         if not 0.0 < library.number(young, "Young's modulus") < np.inf:
             raise InputError(f"Young's modulus {young}: it must be a positive number, Pa")
         if not -1.0 < library.number(poisson, "Poisson's ratio") < 0.5:
-            raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
+            raise InputError(f"Poisson's ratio {poisson}: it must be above -1 and below 0.5")
         c, d = young / (4.0 * (1.0 + poisson)), young / (6.0 * (1.0 - 2.0 * poisson))
         return cls("neo-hookean", c=c, d=d, density=density, prony=prony, fibres=fibres, sheets=sheets, coupling=coupling)
 
@@ -122,7 +123,7 @@ def _term_of(term: ArrayLike, name: str) -> tuple[float, float] | None:
     return float(values[0]), float(values[1])
 
 
-class Scene:
+class Scene(library.Sealed):
     """A mesh of one tissue, or of several of the same law.
 
     Parameters
@@ -162,6 +163,7 @@ class Scene:
         self._removed = np.zeros(len(mesh.tets), np.uint8)
         self._removed[library.node_numbers(removed, len(mesh.tets), "removed", "element")] = 1
         self._build()
+        self._is_made = True
 
     def _build(self) -> None:
         mesh, nodes, elements, tissues = self.mesh, len(self.mesh.points), len(self.mesh.tets), len(self._tissues)
@@ -191,16 +193,23 @@ class Scene:
             size += lib.supple_prony_size(tissues)
         if len(self._directions):
             size += lib.supple_fibres_size(nodes, elements, tissues, made.element)
-        memory = library.Memory(size)
-        scene, error = ffi.new("supple_scene **"), library.new_error()
-        library.checked(lib.supple_scene_init(memory.pointer, size, made, scene, error), error, "the scene")
+        memory, scene, error = library.Memory(size), ffi.new("supple_scene **"), library.new_error()
+        status = lib.supple_scene_init(memory.pointer, memory.size, made, scene, error)
+        # Where tissues meet finely a node has more neighbours than the sizes take for usual.
+        if status == lib.SUPPLE_E_SHORT:
+            memory = library.Memory(int(error.limit))
+            status = lib.supple_scene_init(memory.pointer, memory.size, made, scene, error)
+        library.checked(status, error, "the scene")
         facts = ffi.new("supple_scene_facts *")
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
 
     def _mesh_of_tissue(self) -> Mesh:
         """The mesh without what was removed; nodes keep their numbers."""
-        return self.mesh if not self._removed.any() else Mesh(self.mesh.points, self.mesh.tets[self._removed == 0])
+        mesh, is_left = self.mesh, self._removed == 0
+        if is_left.all():
+            return mesh
+        return Mesh(mesh.points, mesh.tets[is_left], regions=None if mesh.regions is None else mesh.regions[is_left])
 
     def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""

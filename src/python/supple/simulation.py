@@ -141,7 +141,7 @@ class Settled:
     status: str
 
 
-class Simulation:
+class Simulation(library.Sealed):
     """A scene that starts at rest.
 
     Parameters
@@ -187,7 +187,7 @@ class Simulation:
             raise InputError("learned steps need weights, the file of a network")
         if not isinstance(scene, Scene):
             raise InputError(f"scene {scene!r}: it must be a Scene")
-        self.scene, self.method, self._step = scene, method, step
+        self._scene, self.method, self._step = scene, method, step
         nodes = len(scene.mesh.points)
         settings = self._settings = ffi.new("supple_settings *")
         library.checked(lib.supple_default_settings(settings))
@@ -224,6 +224,12 @@ class Simulation:
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self.gravity = gravity
+        self._is_made = True
+
+    @property
+    def scene(self) -> Scene:
+        """What moves; another one after `exchange`, `remove` and `ablate`."""
+        return self._scene
 
     def _adopt(self, memory: library.Memory, sim: Any) -> None:
         """Moves this one from now on."""
@@ -237,8 +243,8 @@ class Simulation:
 
     @property
     def gravity(self) -> NDArray[np.float32]:
-        """m/s^2."""
-        return self._gravity.copy()
+        """m/s^2, read-only: to change it assign three numbers."""
+        return self._gravity
 
     @gravity.setter
     @_one_at_a_time
@@ -246,6 +252,7 @@ class Simulation:
         if np.shape(value) != (3,):
             raise InputError(f"gravity: {value!r}, it must be three numbers, m/s^2")
         self._gravity: NDArray[np.float32] = library.vectors([value], "gravity")[0]
+        self._gravity.flags.writeable = False
         library.checked(lib.supple_set_gravity(self._loads, library.pointer("float", self._gravity)), what="gravity")
 
     @_one_at_a_time
@@ -310,7 +317,8 @@ class Simulation:
         )  # fmt: skip
         library.checked(status, error, "pressure")
         for one in made:
-            library.checked(lib.supple_pressure_set(raw[0], one._surface, one._pascal, one._ramp), what="pressure")
+            status = lib.supple_pressure_set(raw[0], one._surface, one._pascal, one._ramp)
+            library.checked(status, what=f"pressure {one._pascal} Pa, ramp {one._ramp} s")
             library.checked(lib.supple_pressure_fill(raw[0], one._surface, *one._filling), what="pressure")
         library.checked(lib.supple_set_pressure(self._loads, raw[0]))
         self._pressures, self._pressure_memory, self._pressure = made, memory, raw[0]
@@ -489,6 +497,8 @@ class Simulation:
     def reaction(self, nodes: ArrayLike) -> Reaction:
         """What tells the force by which some of the fixed or moved nodes act on the tissue. It takes as long as some hundred steps."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "reaction")
+        if not len(numbers):
+            raise InputError("reaction: there are no nodes: name some that the scene fixes or moves")
         bad = np.flatnonzero(~np.isin(numbers, self.scene._supports[:, 0]))
         if len(bad):
             raise InputError(
@@ -709,8 +719,14 @@ class Simulation:
         bit; pulls are turned as the tissue is now. The motion alone goes back: loads and tissue stay as they are now, without what was
         removed and with what was ablated. An ablation that began later than the state's time ends where it is; another goes on from there
         when its next stage is due. To have the tissue of that time as well, keep its `scene` and `exchange` it before."""
-        data = np.frombuffer(saved, np.uint8)
-        library.checked(lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data)), what="restore")
+        try:
+            data = np.frombuffer(saved, np.uint8)
+        except (TypeError, ValueError):
+            raise InputError(f"restore {saved!r:.40}: it must be the bytes that save gave") from None
+        size = ffi.new("size_t *")
+        library.checked(lib.supple_state_saved_size(self._state, size))
+        status = lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data))
+        library.checked(status, what=f"restore of {len(data)} bytes, where save gives {size[0]}")
         self._ablations = [ablation for ablation in self._ablations if ablation.start <= self.time]
         self._prepare_again()
 
@@ -742,17 +758,26 @@ class Simulation:
             library.checked(lib.supple_sim_set(self._sim, self._settings, error), error, self._what)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...)."""
-        self.scene.mesh.write(path, self._vectors)
+        """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...): what is left of the tissue, and all nodes."""
+        self.scene._mesh_of_tissue().write(path, self._vectors)
 
 
-class Pressure:
+class Pressure(library.Sealed):
     """A pressure on a part of the surface, of `Simulation.add_pressure`."""
 
     def __init__(self, simulation: Simulation, surface: int, numbers: NDArray[np.uint32]) -> None:
-        self._simulation, self._surface, self._numbers = simulation, surface, numbers
+        self._simulation, self._surface = simulation, surface
+        self._cover(numbers)
         self._pascal = self._ramp = 0.0
         self._filling = (0.0, 0.0)
+        self._is_made = True
+
+    def _cover(self, numbers: NDArray[np.uint32]) -> None:
+        """Acts on triangles, which are closed where each edge is there in both directions as often."""
+        corners = numbers.reshape(-1, 3).astype(np.int64)
+        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+        is_matched = np.array_equal(np.sort(start << 32 | end), np.sort(end << 32 | start))
+        self._numbers, self._is_closed = numbers, is_matched and len(numbers) > 0
 
     @property
     def pascal(self) -> float:
@@ -784,8 +809,9 @@ class Pressure:
 
     @property
     def volume(self) -> float:
-        """Within the surface, if it is closed, m^3."""
-        return self._now()[0]
+        """Within the surface, m^3; NaN where it is open, as after a cut."""
+        volume, _ = self._now()
+        return volume if self._is_closed else float("nan")
 
     @property
     def now(self) -> float:
