@@ -1079,8 +1079,8 @@ typedef struct {
      */
     float added_mass;
     /**
-     * Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, and have been
-     * for more than five steps.
+     * Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, or have been in
+     * the 128 steps before, if it was for more than five steps in a row.
      */
     uint32_t held_back;
     /**
@@ -1111,7 +1111,7 @@ typedef struct {
      */
     float stiffness;
     /**
-     * The most force, N, infinite for no limit; zero: 0.15 of the shear modulus on the area in which its nodes hang together with other
+     * The most force, N, infinite for no limit; zero: a quarter of the shear modulus on the area in which its nodes hang together with other
      * tissue, half of that for fewer than eight nodes. More tears the tissue.
      */
     float most;

@@ -133,8 +133,8 @@ impl Progress {
         self.steps
     }
 
-    /// Pulls that the latest exact step held back, if more than five in a row did ([`crate::pulls`]): the motion is another then. A target
-    /// that jumps is followed sooner.
+    /// Pulls that exact steps hold back, or have held back in the last 128 of them, if more than five in a row did
+    /// ([`crate::pulls`]): the motion is another then. A target that jumps is followed sooner.
     #[must_use]
     pub const fn pulls_held_back(&self) -> u32 {
         self.pulls.for_long()

@@ -23,7 +23,7 @@ pub struct supple_pull {
     pub radius: f32,
     /// N/m, from 0, absent, to 1e6.
     pub stiffness: f32,
-    /// The most force, N, infinite for no limit; zero: 0.15 of the shear modulus on the area in which its nodes hang together with other
+    /// The most force, N, infinite for no limit; zero: a quarter of the shear modulus on the area in which its nodes hang together with other
     /// tissue, half of that for fewer than eight nodes. More tears the tissue.
     pub most: f32,
     /// The direction along which it pulls, of any length, as the normal of a surface on which the point slides; zeros: along all.

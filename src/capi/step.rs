@@ -69,8 +69,8 @@ pub struct supple_report {
     pub outside: f32,
     /// Long steps: mean over the nodes of the inertia added, in masses of the node.
     pub added_mass: f32,
-    /// Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, and have been
-    /// for more than five steps.
+    /// Long steps: most nodes that were held back in a step. Exact steps: pulls that are held back at the end of the call, or have been in
+    /// the 128 steps before, if it was for more than five steps in a row.
     pub held_back: u32,
     /// Long steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
     /// remarked upon.

@@ -19,7 +19,7 @@
 //! length. One pull is solved for after the other, and again, at most three times, where pulls share nodes. No pull moves its point by
 //! more than a fiftieth of the size of the tissue at its nodes in such a step, or by little more than in the step before, so that tissue
 //! is not torn before it can answer.
-//! A call at whose end one is held back so for long says that it is limited ([`crate::state::Progress::pulls_held_back`]).
+//! A call at whose end one is held back so for long, or has been lately, says that it is limited ([`crate::state::Progress::pulls_held_back`]).
 //!
 //! Long steps take the force half a step ahead of their start, at the velocity of the point, and raise inertia by twice
 //! the stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]); none is stiffer there than its most
@@ -226,11 +226,11 @@ impl Pull {
     }
 }
 
-/// The most force (N) of a pull on these nodes unless the host says otherwise: 0.15 of the shear modulus on the area in which they hang
+/// The most force (N) of a pull on these nodes unless the host says otherwise: a quarter of the shear modulus on the area in which they hang
 /// together with other tissue, at most three quarters of it on a face of the cube that has the volume of the nodes' own tissue; half as
 /// much for fewer than eight nodes. The area is the sum over the elements that have both nodes of the pull and others, of the volume times
-/// the gradient between them: a patch at a thin edge hangs on less of it than its volume tells. Half as much again tears nodal strain
-/// there where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
+/// the gradient between them: a patch at a thin edge hangs on less of it than its volume tells. Twice as much crushes elements there
+/// where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
 #[must_use]
 pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
     let is_sorted = nodes.is_sorted_by_key(|pulled| pulled.node);
@@ -253,7 +253,7 @@ pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) ->
     }
     // G V^(2/3) with G V the sum.
     let of_volume = if volume > 0.0 { 0.75 * stiffness / libm::cbrtf(volume) } else { f32::INFINITY };
-    let of_area = if across > 0.0 { 0.15 * across } else { f32::INFINITY };
+    let of_area = if across > 0.0 { 0.25 * across } else { f32::INFINITY };
     if nodes.len() < FEW { 0.5 * of_volume.min(of_area) } else { of_volume.min(of_area) }
 }
 

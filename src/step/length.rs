@@ -135,9 +135,10 @@ impl Step {
         self.damping
     }
 
-    /// This step, after a last increment that spans `h` seconds; the force acts over the whole step.
+    /// This step, after a last increment that spans `h` seconds; its factors of the increment and the force are those of
+    /// one after another of its length.
     pub(crate) fn carried_from(self, h: f32) -> Self {
-        if h > 0.0 { Self { carry: self.dt / h, ..self } } else { self }
+        if h > 0.0 { Self { carry: self.dt / h, span: 0.5 * (h + self.dt), ..self } } else { self }
     }
 
     pub(crate) const fn carry(&self) -> f32 {

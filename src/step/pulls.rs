@@ -10,8 +10,8 @@ use crate::simd::NodeVector;
 /// The most that a pull moves its point in an exact step, as a share of the size of a node's tissue.
 pub(crate) const MOST_WAY: f32 = 0.02;
 /// Tissue that moves as a whole may gather speed beyond that: by how much more than by itself, and than its force in the step before
-/// would, a pull may move its point, as shares of that. Half of it holds back every second frame of moving points (`supple-lab pulls`).
-const MOST_GAIN: [f32; 2] = [0.4, 0.1];
+/// would, a pull may move its point, as shares of that. A twentieth holds back every second frame of moving points (`supple-lab pulls`).
+const MOST_GAIN: [f32; 2] = [4.0, 1.0];
 /// A pull is held back where this share of its force and more is left out.
 const LEFT_OUT: f32 = 0.1;
 /// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below

@@ -16,7 +16,7 @@ pub enum Status {
     /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its
     /// tangent), or there is more kinetic energy than the energy balance explains ([`EnergyBalance`]). For a step with
     /// scaled inertia also: much of the motion was held back ([`crate::inertia::Report`]). Of a call: pulls are held back for long at
-    /// its end ([`Progress::pulls_held_back`]).
+    /// its end, or have been lately ([`Progress::pulls_held_back`]).
     Limited {
         /// Smallest volume ratio of an element.
         least_volume_ratio: f32,
@@ -71,7 +71,8 @@ impl Status {
         Self::Ok
     }
 
-    /// The status of a call whose steps say this and lead there: limited also if pulls are held back for long at its end.
+    /// The status of a call whose steps say this and lead there: limited also if pulls are held back
+    /// for long at its end, or have been lately.
     pub(crate) fn at_end(self, progress: &Progress) -> Self {
         if self == Self::Ok && progress.pulls_held_back() > 0 {
             return Self::of_taken(&progress.extremes, &progress.energy_balance, true);

@@ -29,6 +29,7 @@ use glam::Vec4;
 
 use crate::copy::copy;
 use crate::element::{ElementMaterial, Extremes, NodeInertia};
+use crate::held_pulls::HeldPulls;
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
@@ -224,6 +225,8 @@ pub fn settle_in_parts<M: ElementMaterial>(
         Status::Limited { .. } => Status::of_taken(&state.progress.extremes, &EnergyBalance::NEW, false),
         status => status,
     };
+    // These steps hold back others.
+    state.progress.pulls = HeldPulls::NONE;
     // It has been before.
     let _ = stop_in(scene, state);
     Ok(Settled { at_rest: status.is_taken() && settled.remaining < metre, status, ..settled })

@@ -96,7 +96,7 @@ fn a_pull_that_is_held_back_is_told() {
     }
 }
 
-/// What a call ends with hides no refusal, and is forgotten once other steps were taken.
+/// What a call ends with hides no refusal, and is forgotten where the body comes to rest.
 #[test]
 fn a_held_pull_hides_no_refusal() {
     let held = || {
@@ -104,7 +104,7 @@ fn a_held_pull_hides_no_refusal() {
         let at = [0.015, 0.015, BAR.size[2]];
         let pull = body.pull(at, 0.03, 1e4).unwrap();
         body.pulls[pull].most = f32::INFINITY;
-        body.pulls[pull].move_to([at[0] + 0.03, at[1], at[2]], 0.0, 1.0 / 60.0);
+        body.pulls[pull].move_to([at[0] + 0.1, at[1], at[2]], 0.0, 1.0 / 60.0);
         assert!(matches!(body.advance(1.0 / 60.0).unwrap().status, Status::Limited { .. }));
         assert_eq!(body.state().pulls_held_back(), 1);
         body

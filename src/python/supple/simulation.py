@@ -408,7 +408,7 @@ class Simulation(library.Sealed):
         """Draws points of the tissue (m, at rest) to targets (m) from now on, each by the nodes within `radius` (m; 2.2 mean edges unless
         given, some 20 to 50 nodes), with `stiffness` (N/m, one
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
-        (0.15 of the shear modulus on the area in which its nodes hang together with others, half of that for fewer than eight, unless given; more tears the tissue). With `along`, a direction for all or for
+        (a quarter of the shear modulus on the area in which its nodes hang together with others, half of that for fewer than eight, unless given; more tears the tissue). With `along`, a direction for all or for
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent. A point turns with
         the body whenever targets move, and before it settles."""
         radius = _PATCH * self.scene._edge if radius is None else radius
