@@ -123,14 +123,13 @@ impl Hurry {
         Self { within: if holds { self.within } else { cycle }, ..self }
     }
 
-    /// Whether all tiles have to be looked at where the fastest node goes this far in a step, m, from the mean edge of
-    /// the elements.
-    pub(crate) fn is_much_faster(&mut self, way: f32, edge: impl FnOnce() -> f32) -> bool {
+    /// Whether all tiles have to be looked at where the fastest node goes this far in a step, m.
+    pub(crate) fn is_much_faster(&mut self, way: f32, tiles: &[ElementTile]) -> bool {
         let is_faster = way > FASTER * self.way;
         if is_faster || 2.0 * way < self.way {
             self.way = way;
         }
-        is_faster && way > SLOW * edge()
+        is_faster && way > SLOW * edge(tiles)
     }
 
     /// The volume ratio of an element that is not marked falls by `rate` in a step: whether that asks for more haste.
@@ -151,6 +150,14 @@ impl Hurry {
             (*numbers, *way) = (u32::from(self.within) | self.until << 8, self.way.to_bits());
         }
     }
+}
+
+/// The edge of a cube of six elements, m, of the mean volume in some tiles.
+fn edge(tiles: &[ElementTile]) -> f32 {
+    let some = tiles.iter().step_by((tiles.len() / 16).max(1));
+    let volumes = some.flat_map(|tile| (0..TILE).map(|lane| tile.volume::<f32>(lane))).filter(|volume| *volume > 0.0);
+    let (sum, count) = volumes.fold((0.0, 0.0), |(sum, count), volume| (sum + volume, count + 1.0f32));
+    libm::cbrtf(6.0 * sum / count.max(1.0))
 }
 
 /// The largest component, m, by which a node moves.

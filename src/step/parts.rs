@@ -173,7 +173,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let (is_marked, step) = (is_marked_at(vectors, &self.progress.moment()), self.progress.steps);
         let marks = Marks::of(vectors, self.scene.tiles.len());
         let mut hurry = marks.hurry.at(step, self.look_cycle);
-        let is_much_faster = hurry.is_much_faster(self.pace * farthest(self.increment), || self.scene.edge());
+        let is_much_faster = hurry.is_much_faster(self.pace * farthest(self.increment), self.scene.tiles);
         let whole = is_much_faster || !is_marked;
         let turn =
             Turn { now: step as u8, whole, within: hurry.within, cycle: self.look_cycle, pace: self.pace, first: 0 };
