@@ -13,8 +13,8 @@
 //! An element that is seen late meets an energy that was not there, which tears tissue. Where a lobe is torn at, 0 to 3
 //! of its elements are seen late in 400 steps; with a look at all in 16 steps, however they move, 90 to 380 are.
 //!
-//! Marks follow from the displacements when the tile was looked at and from nothing else, so a step that is refused
-//! leaves none behind that the next one would not set. They are told apart from those of another moment by the number
+//! Marks follow from the displacements when the tile was looked at and from nothing else, and turns are changed when the
+//! step is taken, so one that is refused leaves nothing behind that the next one would not set. They are told apart from those of another moment by the number
 //! of steps, the time and the kinetic energy: a state that was restored, put somewhere, undone or looked at by
 //! [`critical_step`](crate::tled::critical_step) is looked at as a whole. A copy of a state has its marks.
 
@@ -51,10 +51,15 @@ pub(crate) fn is_marked_at(vectors: &[NodeVector], moment: &Moment) -> bool {
     kept == Some(moment.mark().number())
 }
 
-/// Says that the marks in `vectors` are of this moment.
-pub(crate) fn mark_moment(vectors: &mut [NodeVector], moment: &Moment) {
-    if let Some(vector) = vectors.first_mut() {
-        must_cast_mut::<NodeVector, [u64; 2]>(vector)[0] = moment.mark().number();
+/// Says that the marks in `vectors` are of this moment, to which the step that wrote them leads.
+pub(crate) fn mark_moment(vectors: &mut [NodeVector], moment: &Moment, tiles: usize) {
+    let Marks { turns, next, .. } = Marks::of(vectors, tiles);
+    turns.iter_mut().zip(next).for_each(|(turn, next)| *turn = *next);
+    if let [first, second, ..] = vectors {
+        let [.., numbers, way] = *must_cast_ref::<NodeVector, [u32; 4]>(second);
+        must_cast_mut::<NodeVector, [u64; 2]>(first)[0] = moment.mark().number();
+        let [.., to_numbers, to_way] = must_cast_mut::<NodeVector, [u32; 4]>(first);
+        (*to_numbers, *to_way) = (numbers, way);
     }
 }
 
@@ -68,9 +73,13 @@ pub(crate) fn forget_crushed(vectors: &mut [NodeVector]) {
 /// The masks in the vectors of a state, one for each tile of elements; none where there are so few nodes for the
 /// elements that they have no room, and every step looks at all.
 pub(crate) fn masks(vectors: &[NodeVector], tiles: usize) -> &[u16] {
-    let bytes: &[u16] = must_cast_slice(vectors.get(1..).unwrap_or_default());
-    // Each tile has its turn besides, of half as many bytes.
-    if bytes.len() < tiles + tiles.div_ceil(2) { &[] } else { bytes.get(..tiles).unwrap_or_default() }
+    let shorts: &[u16] = must_cast_slice(vectors.get(2..).unwrap_or_default());
+    shorts.get(..tiles).filter(|_| has_room(shorts.len(), tiles)).unwrap_or_default()
+}
+
+/// Whether numbers of two bytes are enough for tiles, each of which has its turn and its next one besides its mask.
+const fn has_room(shorts: usize, tiles: usize) -> bool {
+    shorts / 2 >= tiles
 }
 
 /// What a state keeps about its crushed elements, to be changed.
@@ -78,23 +87,25 @@ pub(crate) struct Marks<'a> {
     pub(crate) hurry: Hurry,
     /// Of each tile.
     pub(crate) masks: &'a mut [u16],
-    /// The steps in which tiles are looked at again, modulo 256.
+    /// The steps in which tiles are looked at again, modulo 256; those after the step that is computed, if it is taken.
     pub(crate) turns: &'a mut [u8],
+    pub(crate) next: &'a mut [u8],
 }
 
 impl<'a> Marks<'a> {
-    /// In the vectors of a state; without masks and turns where there is no room for them.
+    /// In the vectors of a state; without those of tiles where there is no room for them.
     pub(crate) fn of(vectors: &'a mut [NodeVector], tiles: usize) -> Self {
-        let (first, rest) = vectors.split_at_mut(vectors.len().min(1));
+        let (first, rest) = vectors.split_at_mut_checked(2).unwrap_or_default();
         let hurry = first.first().map_or(Hurry::NONE, |vector| {
             let [.., numbers, way] = *must_cast_ref::<NodeVector, [u32; 4]>(vector);
             Hurry::kept([numbers, way])
         });
         let shorts: &mut [u16] = must_cast_slice_mut(rest);
-        let room = if shorts.len() < tiles + tiles.div_ceil(2) { 0 } else { tiles };
-        let (masks, turns) = shorts.split_at_mut(room);
-        let turns = must_cast_slice_mut::<u16, u8>(turns).get_mut(..room).unwrap_or_default();
-        Self { hurry, masks, turns }
+        let room = if has_room(shorts.len(), tiles) { tiles } else { 0 };
+        let (masks, bytes) = shorts.split_at_mut_checked(room).unwrap_or_default();
+        let bytes: &mut [u8] = must_cast_slice_mut(bytes);
+        let (turns, rest) = bytes.split_at_mut_checked(room).unwrap_or_default();
+        Self { hurry, masks, turns, next: rest.get_mut(..room).unwrap_or_default() }
     }
 }
 
@@ -143,9 +154,9 @@ impl Hurry {
         is_fast && is_faster
     }
 
-    /// Keeps it in the vectors of a state.
+    /// Keeps it in the vectors of a state, for the time after the step that is computed.
     pub(crate) fn keep(self, vectors: &mut [NodeVector]) {
-        if let Some(vector) = vectors.first_mut() {
+        if let Some(vector) = vectors.get_mut(1) {
             let [.., numbers, way] = must_cast_mut::<NodeVector, [u32; 4]>(vector);
             (*numbers, *way) = (u32::from(self.within) | self.until << 8, self.way.to_bits());
         }
@@ -244,7 +255,8 @@ pub(crate) struct Look<'a> {
     pub(crate) turn: Turn,
     /// Of these tiles, or none to be written.
     pub(crate) masks: &'a mut [u16],
-    pub(crate) turns: &'a mut [u8],
+    pub(crate) turns: &'a [u8],
+    pub(crate) next: &'a mut [u8],
 }
 
 impl<'a> Look<'a> {
@@ -255,7 +267,7 @@ impl<'a> Look<'a> {
         below: f32,
         masks: &'a mut [u16],
     ) -> Self {
-        Self { tiles, displacement, increment: &[], below, turn: Turn::ALL, masks, turns: &mut [] }
+        Self { tiles, displacement, increment: &[], below, turn: Turn::ALL, masks, turns: &[], next: &mut [] }
     }
 
     /// Compiled with this crate, as it is not generic.
@@ -300,7 +312,7 @@ impl Kernel for Look<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) -> Seen<f32> {
-        let Self { tiles, displacement, increment, below, turn, masks, turns } = self;
+        let Self { tiles, displacement, increment, below, turn, masks, turns, next } = self;
         let moved = [displacement, increment].map(Gather::new);
         let mut seen = Seen::<R>::nothing();
         for first in (0..tiles.len()).step_by(8) {
@@ -315,7 +327,7 @@ impl Kernel for Look<'_> {
                 if let Some(place) = masks.get_mut(index) {
                     *place = mask;
                 }
-                if let Some(place) = turns.get_mut(index) {
+                if let Some(place) = next.get_mut(index) {
                     *place = turn.next(index, steps);
                 }
             }

@@ -259,7 +259,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.steps += 1;
         self.progress.pulls.enter(self.held_pulls);
         if self.scene.element().is_nodal_strain() {
-            mark_moment(self.volume, &self.progress.moment());
+            mark_moment(self.volume, &self.progress.moment(), self.scene.tiles.len());
         }
         self.accept_pushes();
         self.follow_motions();

@@ -182,7 +182,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let is_fast = hurry.enter(seen.rate, step);
         hurry.keep(vectors);
         if is_fast {
-            for turn in Marks::of(vectors, self.scene.tiles.len()).turns {
+            for turn in Marks::of(vectors, self.scene.tiles.len()).next {
                 *turn = (step as u8).wrapping_add(turn.wrapping_sub(step as u8).min(hurry.within));
             }
         }
@@ -237,18 +237,21 @@ fn look<M: ElementMaterial>(
     marks: Marks<'_>,
     threads: &impl Threads,
 ) -> Seen<f32> {
-    let Marks { mut masks, mut turns, .. } = marks;
+    let Marks { mut masks, turns, mut next, .. } = marks;
+    let turns = &*turns;
+    next.iter_mut().zip(turns).for_each(|(next, turn)| *next = *turn);
     let partitions = scene.elements().partitions;
     // Of a few tiles there is too little for threads.
     let count = partitions.parts(if turn.whole || turn.within <= FEW_STEPS { threads.parts() } else { 1 });
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
         let own = partitions.tiles_of(&partitions.part(part, count));
-        let (masks, turns) = (take(&mut masks, own.len()), take(&mut turns, own.len()));
-        (own, masks, turns, Seen::nothing())
+        let (masks, next) = (take(&mut masks, own.len()), take(&mut next, own.len()));
+        (own, masks, next, Seen::nothing())
     });
-    let see = |(own, masks, turns, seen): &mut (Range<usize>, &mut [u16], &mut [u8], Seen<f32>)| {
+    let see = |(own, masks, next, seen): &mut (Range<usize>, &mut [u16], &mut [u8], Seen<f32>)| {
         let (turn, tiles) = (Turn { first: own.start, ..turn }, scene.tiles.get(own.clone()).unwrap_or_default());
-        *seen = Look { tiles, displacement, increment, below: MARKED, turn, masks, turns }.see();
+        let turns = turns.get(own.clone()).unwrap_or_default();
+        *seen = Look { tiles, displacement, increment, below: MARKED, turn, masks, turns, next }.see();
     };
     match parts.get_mut(..count).unwrap_or_default() {
         [one] => see(one),

@@ -121,3 +121,30 @@ fn inertia_of_another_scene_of_the_same_size_is_refused() {
     assert_eq!(status, Status::Mismatch { nodes, room: 0 });
     assert_eq!(large.step(scene.view(), &Loads::NONE, state.view()), Status::Ok);
 }
+
+/// A body that falls as fast as damping lets it goes on so where steps become long, and no energy is missing: damping acts
+/// as long as the weight does.
+#[test]
+fn a_steady_fall_goes_on_where_steps_become_long() {
+    let (body, damping) = (small_bar(), 200.0);
+    let scene = body.scene(tissue(NEO), &[]);
+    let loads = Loads::new(&scene, [0.0, 0.0, -9.81], &[], &[]).unwrap();
+    let short = Step::unchecked(0.5 * limit(&scene), damping).unwrap();
+    let long = Step::unchecked(10.0 * limit(&scene), damping).unwrap();
+    let mut state = rest_of(&scene);
+    let mut large = prepared(&body, &scene, &mut state, long, 2.0);
+    while state.time() < 0.1 {
+        assert_eq!(tled::step(&scene, &loads, &mut state, &short), Status::Ok);
+    }
+    let height = |state: &VecState| {
+        let all = state.displacements();
+        all.iter().map(|moved| f64::from(moved.to_array()[2])).sum::<f64>() / all.len() as f64
+    };
+    let (time, from) = (state.time(), height(&state));
+    for _ in 0..10 {
+        assert_eq!(large.step(scene.view(), &loads, state.view()), Status::Ok);
+    }
+    let speed = (from - height(&state)) / (state.time() - time) * f64::from(damping) / 9.81;
+    println!("{speed:.4} of the steady speed in ten long steps");
+    assert!((speed - 1.0).abs() < 2e-3);
+}
