@@ -67,9 +67,9 @@ def test_a_saved_state_goes_on_to_the_bit(soft):
     simulation.advance(0.05)
     assert (simulation.displacements == end).all()
     plain = supple.Simulation(supple.Scene(simulation.scene.mesh, soft, element="nodal-strain"))
-    with pytest.raises(supple.InputError, match="tissue that remembers other things"):
+    with pytest.raises(supple.InputError, match="that remembers other things"):
         plain.restore(saved)
-    with pytest.raises(supple.InputError, match="tissue that remembers other things"):
+    with pytest.raises(supple.InputError, match="that remembers other things"):
         simulation.restore(plain.save())
 
 
