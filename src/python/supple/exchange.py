@@ -78,7 +78,7 @@ def _load_what_is_left(simulation: Simulation) -> None:
             triangles = one._numbers.reshape(-1, 3)
             is_left = scene._are_of_boundary(triangles)
             if not is_left.all():
-                one._cover(triangles[is_left].ravel())
+                one._numbers = triangles[is_left].ravel()
                 one._filling = (0.0, 0.0)
         simulation._set_pressures(simulation._pressures)
 

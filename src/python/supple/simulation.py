@@ -766,18 +766,10 @@ class Pressure(library.Sealed):
     """A pressure on a part of the surface, of `Simulation.add_pressure`."""
 
     def __init__(self, simulation: Simulation, surface: int, numbers: NDArray[np.uint32]) -> None:
-        self._simulation, self._surface = simulation, surface
-        self._cover(numbers)
+        self._simulation, self._surface, self._numbers = simulation, surface, numbers
         self._pascal = self._ramp = 0.0
         self._filling = (0.0, 0.0)
         self._is_made = True
-
-    def _cover(self, numbers: NDArray[np.uint32]) -> None:
-        """Acts on triangles, which are closed where each edge is there in both directions as often."""
-        corners = numbers.reshape(-1, 3).astype(np.int64)
-        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-        is_matched = np.array_equal(np.sort(start << 32 | end), np.sort(end << 32 | start))
-        self._numbers, self._is_closed = numbers, is_matched and len(numbers) > 0
 
     @property
     def pascal(self) -> float:
@@ -810,8 +802,7 @@ class Pressure(library.Sealed):
     @property
     def volume(self) -> float:
         """Within the surface, m^3; NaN where it is open, as after a cut."""
-        volume, _ = self._now()
-        return volume if self._is_closed else float("nan")
+        return self._now()[0]
 
     @property
     def now(self) -> float:
