@@ -43,6 +43,8 @@ pub struct Progress {
     pub(crate) energy_balance: EnergyBalance,
     /// Step that the last increment spans, s; zero before the first step.
     pub(crate) dt: f32,
+    /// Its damping, 1/s.
+    pub(crate) damping: f32,
     /// At the start of the latest step.
     pub(crate) extremes: Extremes<f32>,
     /// Time of what tissue remembers before that of the state, s: half the last step.
@@ -107,6 +109,7 @@ impl Progress {
             steps,
             energy_balance,
             dt: last_step,
+            damping: 0.0,
             extremes,
             half,
             second: false,

@@ -21,7 +21,7 @@ pub struct supple_state {
     /// Of the scene that it was prepared for.
     element: Element,
     /// Vectors of what tissue remembers, both copies, and a checksum of the tables that they belong to.
-    remembered: usize,
+    remembered: u32,
     tables: u32,
     /// Of the step; zero without one.
     step_seconds: f32,
@@ -107,7 +107,7 @@ pub unsafe extern "C" fn supple_state_init(
             head,
             nodes,
             element,
-            remembered,
+            remembered: remembered as u32,
             tables,
             step_seconds: 0.0,
             step_damping: 0.0,
@@ -246,7 +246,7 @@ impl supple_state {
 
     /// Bytes of what tissue remembers, one copy.
     pub(super) const fn remembered_bytes(&self) -> usize {
-        self.remembered / 2 * size_of::<NodeVector>()
+        self.remembered as usize / 2 * size_of::<NodeVector>()
     }
 }
 
@@ -261,14 +261,14 @@ pub(super) unsafe fn remember_in(open: &OpenScene<'_>, object: *mut supple_state
         fits(open, object)?;
         let &supple_state { nodes, element, remembered, tables, .. } = &*object;
         let ([_, needed], checksum) = (open.remembers(), open.view().memory_checksum());
-        if needed == remembered && checksum == tables {
+        if needed == remembered as usize && checksum == tables {
             return Ok(());
         }
         let room = memory::bytes_of(object.cast_const()).saturating_sub(layout(nodes, element, 0).bytes());
         if needed * size_of::<NodeVector>() > room {
             return Err(other_tissue(room, needed * size_of::<NodeVector>()));
         }
-        ((*object).remembered, (*object).tables) = (needed, checksum);
+        ((*object).remembered, (*object).tables) = (needed as u32, checksum);
         opened(object)?.forget();
         Ok(())
     }
@@ -303,7 +303,7 @@ pub(super) unsafe fn opened<'a>(object: *mut supple_state) -> Answer<StateView<'
     // SAFETY: the caller's promise.
     unsafe {
         memory::is(object.cast_const())?;
-        let (nodes, element, remembered) = ((*object).nodes, (*object).element, (*object).remembered);
+        let (nodes, element, remembered) = ((*object).nodes, (*object).element, (*object).remembered as usize);
         Ok(view(Arrays::behind(object.cast_const()), nodes, element, remembered, &mut (*object).progress))
     }
 }
@@ -316,7 +316,7 @@ pub(super) unsafe fn opened_of<'a>(open: &OpenScene<'_>, object: *mut supple_sta
     // SAFETY: the caller's promise.
     unsafe {
         fits(open, object)?;
-        let (remembered, [_, needed]) = ((*object).remembered, open.remembers());
+        let (remembered, [_, needed]) = ((*object).remembered as usize, open.remembers());
         if remembered != needed {
             return Err(other_tissue(remembered * size_of::<NodeVector>(), needed * size_of::<NodeVector>()));
         }
@@ -364,7 +364,7 @@ pub(super) unsafe fn remembered<'a>(object: *const supple_state) -> Answer<&'a [
         for count in [nodes as usize, nodes as usize, nodes as usize, nodes as usize, volumes(nodes, element)] {
             arrays.read::<NodeVector>(count);
         }
-        let all = arrays.read::<NodeVector>(remembered);
+        let all = arrays.read::<NodeVector>(remembered as usize);
         let (first, second) = all.split_at(all.len() / 2);
         Ok(if progress.second { second } else { first })
     }

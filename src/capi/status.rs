@@ -497,7 +497,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -50 => c"the learned step needs a lead-in up to this moment",
         -51 => c"the network's step is no whole number of the exact one, or of too many",
         -52 => c"the damping is not that of the training",
-        -60 => c"a lattice that cannot be, or a mesh too small for one",
+        -60 => c"no lattice for steps of this length on this mesh: shorter or somewhat longer steps, or fewer cells, may serve, exact steps do",
         -61 => c"too stiff, or not finite",
         -65 => c"a constant of fibres is not a finite positive number",
         -66 => c"the directions of the fibres in an element are zero, parallel or missing",

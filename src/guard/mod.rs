@@ -214,6 +214,11 @@ impl Watch {
         self.seen = None;
     }
 
+    /// Whether a state has come from where the guard has seen it last.
+    pub(crate) fn follows(&self, progress: &Progress) -> bool {
+        self.seen.is_some() && self.seen == progress.seen
+    }
+
     /// The first run takes exact steps: it has no error in its first steps from rest.
     pub(crate) const fn start_is_exact(&mut self) {
         self.envelope.start_is_exact();
@@ -222,6 +227,11 @@ impl Watch {
     /// Distance of the two runs at the latest comparison, m.
     pub(crate) const fn distance(&self) -> f32 {
         self.envelope.distance()
+    }
+
+    /// The longest steps of the second run, s.
+    pub(crate) const fn longest(&self) -> f32 {
+        self.longest
     }
 
     /// How many comparisons there were.
@@ -273,7 +283,8 @@ impl GuardView<'_> {
             _ => {}
         }
         large.change_step(step);
-        (watch.longest, watch.interval) = (seconds, seconds);
+        // A guard that is new compares in the next step all the same.
+        (watch.longest, watch.interval) = (seconds, if watch.envelope.is_new() { 0.0 } else { seconds });
     }
 
     /// See [`Guard::follow`].

@@ -26,6 +26,9 @@ use super::rest_check::{FEWEST, MOST_RATIO, RestCheck, longer_step, stiffening};
 use super::rough_motion::RoughMotion;
 use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
+/// Share of its length that a step may be shortened by calls and keep the inertia of that length.
+const SAME_INERTIA: f32 = 0.7;
+
 /// A prepared step without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
 pub struct LargeModel {
@@ -54,6 +57,8 @@ pub struct LargeModel {
     /// ([`super::rest_check`]).
     stiffening: [f32; 2],
     first: f32,
+    /// Length of the steps of the latest call, s; zero before the first.
+    asked: f32,
     /// Inertia in use is that of another length of step.
     pub(super) is_for_other_step: bool,
     pub(super) lattice: Lattice,
@@ -201,6 +206,7 @@ impl LargeModel {
             scaling: scaling_of(step, 1.0),
             stiffening: [1.0; 2],
             first: step.seconds(),
+            asked: 0.0,
             renewal: Renewal::NEW,
             lattice: Lattice::NONE,
             report: Report::NONE,
@@ -321,6 +327,23 @@ impl LargeModel {
         let [first, longer] = self.stiffening;
         self.scaling = scaling_of(step, if step.seconds() > self.first { longer } else { first });
         self.is_for_other_step = true;
+    }
+
+    /// The longest steps that it was made for, s.
+    pub(crate) const fn first(&self) -> f32 {
+        self.first
+    }
+
+    /// A call asks for steps of so many seconds. Where the one before did as well, or there was none, and inertia in use is that of quite other
+    /// ones, which would hold the body back: those to go over to.
+    pub(crate) fn ask(&mut self, seconds: f32) -> Option<Step> {
+        let is_near = |other: f32, share: f32| seconds > share * other && other > share * seconds;
+        let before = core::mem::replace(&mut self.asked, seconds);
+        if (before == 0.0 || is_near(before, 0.95)) && !is_near(self.longest(), SAME_INERTIA) {
+            Step::unchecked(seconds, self.prepared.damping()).ok()
+        } else {
+            None
+        }
     }
 
     /// Constants of the tissue have changed: the next step computes all inertia anew.

@@ -216,7 +216,7 @@ impl fmt::Display for InertiaError {
             }
             Self::Singular { cells: [x, y, z] } => write!(
                 f,
-                "a lattice of {x} x {y} x {z} cells is too fine for this mesh and step: its inertia cannot be inverted"
+                "a lattice of {x} x {y} x {z} cells is too fine for this mesh and step, its inertia cannot be inverted: shorter or somewhat longer steps, or fewer cells, may serve, exact steps do"
             ),
             Self::TooSmall { nodes } => {
                 write!(f, "a mesh of {nodes} nodes is too small for long steps: take exact ones")

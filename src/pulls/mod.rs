@@ -64,6 +64,8 @@ pub struct Pull {
     pub at: [f32; 3],
     /// How far it has turned with the body about the mean place of its nodes, m ([`turn`]).
     pub turned: [f32; 3],
+    /// When, s, modulo 64; NaN: never.
+    pub turned_at: f32,
     /// N/m; 0: absent.
     pub stiffness: f32,
     /// The most force, N; infinite: no limit.
@@ -129,6 +131,7 @@ impl Pull {
             stiffness,
             most: f32::INFINITY,
             turned: [0.0; 3],
+            turned_at: f32::NAN,
             along: [0.0; 3],
             from: at,
             to: at,
@@ -170,6 +173,12 @@ impl Pull {
     fn among<'a>(&self, nodes: &'a [PulledNode]) -> &'a [PulledNode] {
         let [first, count] = self.nodes.map(|number| number as usize);
         nodes.get(first..first.saturating_add(count)).unwrap_or_default()
+    }
+
+    /// From the mean place of its nodes at rest to its point there, m.
+    fn arm(&self, points: &[[f32; 3]], nodes: &[PulledNode]) -> Vec3 {
+        let place = |node: usize| points.get(node).copied().unwrap_or_default().into();
+        Vec3::from_array(self.at) - mean(self.among(nodes), place)
     }
 
     /// Where its point would be if its nodes had turned only, m.

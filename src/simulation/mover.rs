@@ -3,13 +3,13 @@
 use super::Report;
 use crate::adaptive::AdaptiveView;
 use crate::element::ElementMaterial;
-use crate::guard::{Estimate, GuardView};
+use crate::guard::{Estimate, GuardView, judged};
 use crate::inertia::{self, LargeModel};
 use crate::learned::{LearnedError, LearnedReport, LearnedView, Undone};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::StateView;
+use crate::state::{Progress, StateView};
 use crate::step::{Cause, Divergence, MOST_OF_SIZE, ROUNDING, Status, Step, Threads, Work, equal_steps};
 use crate::tled::{self, Approach, Pace};
 
@@ -127,7 +127,10 @@ impl Mover<'_, '_> {
         let span = until - state.time();
         match self {
             // The last call may have ended here or beyond; a span that is no number is none either.
-            _ if span.is_nan() || span <= SHORTEST * f64::from(state.last_step()) => {}
+            mover if span.is_nan() || span <= SHORTEST * f64::from(state.last_step()) => {
+                call.report.estimate = mover.estimate(&state);
+                call.report.enter(still_true(state.progress, call.report.estimate));
+            }
             Self::Exact(mut exact) => {
                 call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
             }
@@ -144,6 +147,27 @@ impl Mover<'_, '_> {
         call.report.status = call.report.status.at_end(state.progress);
         Ok(Report { time: state.time(), ..call.report })
     }
+}
+
+impl Mover<'_, '_> {
+    /// What is known of the error of a state that its own steps have led to.
+    fn estimate(&self, state: &StateView<'_>) -> Option<Estimate> {
+        let (watch, estimate) = match self {
+            Self::Long(.., Some(guard)) | Self::Learned(.., Some(guard)) => (&*guard.watch, guard.watch.estimate()),
+            Self::Auto(AdaptiveView { chooser, watch, .. }) => (&**watch, chooser.estimate(watch)),
+            _ => return None,
+        };
+        estimate.filter(|_| watch.follows(state.progress))
+    }
+}
+
+/// What the last step said of a state in which no step is taken, and its estimate.
+fn still_true(progress: &Progress, estimate: Option<Estimate>) -> Status {
+    if progress.last_step() == 0.0 {
+        return Status::Ok;
+    }
+    let taken = Status::of_taken(&progress.extremes, &progress.energy_balance, false);
+    estimate.map_or(taken, |Estimate { mean, allowed, .. }| judged(taken, mean, allowed))
 }
 
 #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
@@ -282,6 +306,17 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         state: &mut StateView<'_>,
     ) {
         let until = state.time() + span;
+        let (count, seconds) = equal_steps(span, model.first());
+        if let Some(step) = model.ask(seconds) {
+            if let Some(guard) = &mut guard {
+                let seconds = step.seconds() * (guard.watch.longest() / model.longest());
+                let loads = self.loads.of_step(state, step.seconds(), count);
+                if let Ok(longer) = Step::unchecked(seconds, step.damping()) {
+                    guard.reborrow().change_step(longer, scene, Some(&loads), self.threads);
+                }
+            }
+            model.change_step(step);
+        }
         model.follow(state.progress);
         let mut longest = model.longest();
         let shortest = longest / (1 << MOST_HALVINGS) as f32;

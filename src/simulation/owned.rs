@@ -206,7 +206,13 @@ impl<'w> Simulation<'w> {
     pub fn turn_pulls(&mut self) -> f32 {
         let Self { scene, points, state, pulled, pulls, .. } = self;
         let scene = scene.view();
-        turn(points, |node| scene.node_mass(node), state.displacements(), pulled, pulls)
+        turn(points, |node| scene.node_mass(node), state, state.displacements(), pulled, pulls)
+    }
+
+    /// The same in full, as of a body that was put where it is.
+    pub(super) fn turn_pulls_anew(&mut self) {
+        self.pulls.iter_mut().for_each(|pull| pull.turned_at = f32::NAN);
+        self.turn_pulls();
     }
 
     /// Where the point of a pull is and how it is pulled. None if there is no such pull.

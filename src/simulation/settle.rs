@@ -12,7 +12,7 @@ use crate::tled::{self, Settled, settle_in_parts, vectors_to_settle};
 impl Simulation<'_> {
     /// Brings the body to rest under its loads and instruments ([`tled::settle`]): every node to within about `metre` (m)
     /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
-    /// time, which stands still, the points of pulls turned with the body as it is before ([`Simulation::turn_pulls`]), and
+    /// time, which stands still, the points of pulls turned with the body ([`Simulation::turn_pulls`]), and
     /// velocities are zero afterwards; ablations are as far as they are due, and steps of every method go on from there. Where a
     /// step is refused the error says why; the body then stands where the steps before have brought it.
     pub fn settle(&mut self, metre: f32, most_steps: u32) -> Result<Settled, SimulationError> {
@@ -30,12 +30,21 @@ impl Simulation<'_> {
         // What is refused turns nothing.
         self.acting()?;
         self.turn_pulls();
-        let Acting { mut loads, scene, state, .. } = self.acting()?;
-        let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
-        let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, most_steps, &mut room, threads)?;
-        match settled.status {
-            Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
-            _ => Ok(settled),
+        let mut room = vec![NodeVector::ZERO; vectors_to_settle(self.scene().node_count())];
+        let mut steps = 0;
+        loop {
+            let Acting { mut loads, scene, state, .. } = self.acting()?;
+            let left = most_steps.saturating_sub(steps);
+            let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, left, &mut room, threads)?;
+            if let Status::Diverged(divergence) = settled.status {
+                return Err(SimulationError::Refused(divergence));
+            }
+            steps += settled.steps;
+            // Where it rests its pulls have turned it, and turn with it.
+            let has_turned = settled.at_rest && self.turn_pulls() > metre;
+            if !has_turned || steps >= most_steps {
+                return Ok(Settled { at_rest: settled.at_rest && !has_turned, steps, ..settled });
+            }
         }
     }
 
@@ -58,7 +67,7 @@ impl Simulation<'_> {
     pub fn set_displacements(&mut self, metre: &[[f32; 3]]) -> Result<(), SimulationError> {
         let (scene, state) = self.parts_mut();
         tled::displace(scene, state, metre)?;
-        self.turn_pulls();
+        self.turn_pulls_anew();
         self.forget_steps();
         Ok(())
     }

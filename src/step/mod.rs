@@ -253,7 +253,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.energy_balance = EnergyBalance { heat, ..self.measured(balance, method) };
         self.progress.extremes = extremes;
         method.advance(&mut self);
-        self.progress.dt = step.seconds();
+        (self.progress.dt, self.progress.damping) = (step.seconds(), step.damping());
         (self.progress.half, self.progress.second) = (self.halves[1], !self.progress.second);
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;

@@ -184,7 +184,7 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
     let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
     // More of them on demand.
     let asked = std::env::var("POSES").ok().and_then(|poses| poses.parse().ok());
-    let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 10_000 } else { 1_000 });
+    let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 4_000 } else { 1_000 });
     let body = || Body::new(BAR, &fixed, 20.0);
     for (body, multiple) in [(body(), 4.0f32), (body(), 20.0), (body().with_triangles(), 20.0)] {
         let mut run = Run::new(body, Some(long()), multiple * critical, 20.0);

@@ -131,7 +131,7 @@ fn any_poses(mut body: Body) {
     let (mut taken, mut refused, mut touched) = (0, 0, 0);
     // More of them on demand.
     let asked = std::env::var("POSES").ok().and_then(|poses| poses.parse().ok());
-    let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 100_000 } else { 5_000 });
+    let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 30_000 } else { 5_000 });
     for pose in 0..poses {
         let place = [0.06, 0.06, 0.08].map(|size| size * (random() - 0.25));
         let direction = [random() - 0.5, random() - 0.5, random() - 0.5];

@@ -385,6 +385,27 @@ fn a_call_ends_when_its_work_is_spent() {
     }
 }
 
+/// The state that it shows is the one that the call before has doubted.
+#[test]
+fn a_call_without_a_step_tells_what_is_known_of_the_state() {
+    let body = small_bar();
+    let critical = Parts::of(&body).critical.seconds;
+    for method in [Method::Long(long()), Method::Auto(long())] {
+        let step = matches!(method, Method::Long(_)).then_some(20.0 * critical);
+        let settings = Settings { method, step, tolerance: Some(1e-5), damping: DAMPING, ..Settings::default() };
+        let mut simulation = twisted(&body, settings);
+        let mut doubted = 0;
+        for _ in 0..30 {
+            let [long, short] = [20.0 * f64::from(critical), 1e-9].map(|span| simulation.advance(span).unwrap());
+            assert_eq!((short.steps(), short.estimate), (0, long.estimate));
+            assert_eq!(short.is_ok(), long.is_ok(), "{:?} after {:?}", short.status, long.status);
+            doubted += usize::from(!short.is_ok());
+        }
+        println!("{doubted} of 30 calls without a step are doubted");
+        assert!((1..30).contains(&doubted));
+    }
+}
+
 /// Nodes whose forces only added inertia bears must not be thrown by the first exact step.
 #[test]
 fn settings_may_change_from_long_to_exact_steps() {

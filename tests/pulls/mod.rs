@@ -5,6 +5,7 @@ mod closed_forms;
 mod hostile;
 mod late;
 mod stiff;
+mod turned;
 
 use supple::inertia;
 use supple::material::{Element, NeoHookean, VecMaterial};

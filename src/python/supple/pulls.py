@@ -96,10 +96,11 @@ class PullMemory:
         status = lib.supple_set_targets_from(self.raw, first, library.pointer("float", rows), len(rows), *times, error)
         library.checked(status, error, "targets")
 
-    def turn(self, simulation: Simulation) -> None:
-        """With the body."""
-        points = library.pointer("float", simulation.scene.mesh.points)
-        library.checked(lib.supple_turn_pulls(self.raw, simulation._raw_scene, points, simulation._state, ffi.NULL), what="pulls")
+    def turn(self, simulation: Simulation) -> float:
+        """With the body. By how much at most, m."""
+        points, most = library.pointer("float", simulation.scene.mesh.points), ffi.new("float *")
+        library.checked(lib.supple_turn_pulls(self.raw, simulation._raw_scene, points, simulation._state, most), what="pulls")
+        return float(most[0])
 
     def read(self, state: Any) -> NDArray[np.void]:
         found = np.zeros(self.count, _PULLED)

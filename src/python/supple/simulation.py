@@ -410,7 +410,7 @@ class Simulation(library.Sealed):
         for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
         (a quarter of the shear modulus on the area in which its nodes hang together with others, half of that for fewer than eight, unless given; more tears the tissue). With `along`, a direction for all or for
         each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent. A point turns with
-        the body whenever targets move, and before it settles."""
+        the body whenever targets move, and while it settles."""
         radius = _PATCH * self.scene._edge if radius is None else radius
         wanted = wanted_of(points, radius, stiffness, most, along)
         groups = [*self._pull_groups, wanted]
@@ -624,13 +624,21 @@ class Simulation(library.Sealed):
         self._warn_once()
         next_stage(self)
         room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
-        if self._pull_memory:
-            self._pull_memory.turn(self)
-        told = ffi.new("supple_settled *")
-        status = lib.supple_sim_settle(self._sim, metre, most_steps, self._threads, room.pointer, room.size, told)
-        library.checked(status, told.error, "settle")
-        word = _WORDS.get(status, str(status))
-        return Settled(word != "behind", float(told.remaining), int(told.steps), word)
+        pulls, told, steps = self._pull_memory, ffi.new("supple_settled *"), 0
+        if pulls:
+            pulls.turn(self)
+        while True:
+            left = max(1, most_steps - steps)
+            status = lib.supple_sim_settle(self._sim, metre, left, self._threads, room.pointer, room.size, told)
+            library.checked(status, told.error, "settle")
+            steps += int(told.steps)
+            behind = status == lib.SUPPLE_BEHIND
+            # Where it rests its pulls have turned it, and turn with it.
+            has_turned = bool(pulls) and not behind and pulls.turn(self) > metre
+            if not has_turned or steps >= most_steps:
+                break
+        word = "behind" if has_turned else _WORDS.get(status, str(status))
+        return Settled(word != "behind", float(told.remaining), steps, word)
 
     @_one_at_a_time
     def set_displacements(self, metre: ArrayLike) -> None:
@@ -642,6 +650,8 @@ class Simulation(library.Sealed):
         error = library.new_error()
         given = library.pointer("float", rows)
         library.checked(lib.supple_set_displacements(self._raw_scene, self._state, given, len(rows), error), error, "displacements")
+        # Made anew, they turn in full.
+        self._set_pulls(self._pull_groups)
         self._prepare_again()
 
     # What it comes to.
