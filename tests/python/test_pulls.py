@@ -67,6 +67,25 @@ def test_points_with_errors_register_a_body(soft, method):
     assert not pulls.forces[7].any() and np.isnan(pulls.targets[7]).all()
 
 
+def test_points_turn_with_a_body_that_settles_and_feed_no_motion(soft):
+    mesh, (sine, cosine) = bar(cells=(3, 3, 8)), (np.sin(0.7), np.cos(0.7))
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    at = np.array([[0.01, 0.02, 0.06], [0.01, 0.0, 0.05], [0.0, 0.0, 0.06], [0.0, 0.02, 0.0]])
+    simulation = supple.Simulation(supple.Scene(mesh, soft, element="nodal-strain"), damping=20.0)
+    pulls = simulation.pull(at, at @ turn.T)
+    assert simulation.settle(1e-5).at_rest
+    off = np.linalg.norm(simulation.positions - mesh.points @ turn.T, axis=1).max()
+    # A knock, and targets that move to where they are in each frame.
+    simulation.set_forces([0], [[0.0, 0.05, 0.0]])
+    fastest = []
+    for _ in range(60):
+        pulls.move(at @ turn.T, within=1 / 60)
+        fastest.append(simulation.advance(1 / 60).kinetic_energy)
+        simulation.set_forces([], np.zeros((0, 3)))
+    print(f"settled {1e3 * off:.3f} mm off, {max(fastest):.1e} J after the knock, {fastest[-1]:.1e} at last")
+    assert off < 1e-4 and 1e-9 < max(fastest[:3]) == max(fastest) and fastest[-1] < 1e-3 * max(fastest)
+
+
 def test_targets_move_and_pulls_end(soft):
     mesh = bar()
     simulation = supple.Simulation(supple.Scene(mesh, soft), damping=20.0)
