@@ -21,6 +21,7 @@ use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
+use crate::mesh::overlap;
 use error::Fault;
 pub use error::ReadError;
 pub use file::{read_file, read_text};
@@ -63,7 +64,7 @@ pub struct CellVectors {
 /// - `.node` or `.ele`: TetGen; the other file must be in the same folder
 ///
 /// Points, lines and surface cells other than triangles are left out. A volume cell that is not a tetrahedron with
-/// four nodes is an error, as is a file without tetrahedra.
+/// four nodes is an error, as are a file without tetrahedra and tetrahedra that overlap: listed twice, or three at a face.
 pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
     let mesh = read_any(path)?;
     if mesh.tets.is_empty() {
@@ -93,6 +94,18 @@ pub fn read_surface(path: &Path) -> Result<SurfaceMesh, ReadError> {
 }
 
 fn read_any(path: &Path) -> Result<TetMesh, ReadError> {
+    let mesh = read_as_it_is(path)?;
+    // With twice the mass and stiffness they would look sound, and no boundary would be left of them.
+    match overlap(&mesh.tets) {
+        Some(overlap) => Err(Fault::new("", format_args!("{overlap}; {REMEDY}")).in_file(path)),
+        None => Ok(mesh),
+    }
+}
+
+/// For tetrahedra that overlap.
+const REMEDY: &str = "list each once (Gmsh lists those of two physical groups twice in version 2.2: save version 4.1, or give each volume one group)";
+
+fn read_as_it_is(path: &Path) -> Result<TetMesh, ReadError> {
     let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "vtk" => parse(path, vtk::read),

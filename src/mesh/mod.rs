@@ -14,6 +14,8 @@ pub(crate) use boundary::boundary_in;
 pub(crate) use boundary::faces;
 #[cfg(any(feature = "std", test))]
 pub(crate) use boundary::in_order;
+#[cfg(feature = "std")]
+pub use boundary::{Overlap, overlap};
 pub use renumbering::renumber;
 pub(crate) use renumbering::{BITS as CURVE_BITS, every_third_bit};
 

@@ -19,8 +19,8 @@ fn every_kind_of_fault_is_counted_and_its_first_case_named() {
     let desk = Desk::new();
     desk.write(
         "bad.msh",
-        "$NOD\n6\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 0\n6 9 9 9\n$ENDNOD\n\
-         $ELM\n5\n1 4 1 1 4 1 2 3 4\n2 4 1 1 4 1 3 2 4\n3 4 1 1 4 1 3 2 4\n4 4 1 1 4 1 2 3 5\n5 4 1 1 4 1 2 3 3\n$ENDELM\n",
+        "$NOD\n10\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 0\n6 9 9 9\n7 -1 0 0\n8 0 -1 0\n9 0 0 -1\n10 0 1 1\n$ENDNOD\n\
+         $ELM\n5\n1 4 1 1 4 1 2 3 4\n2 4 1 1 4 1 7 3 4\n3 4 1 1 4 1 7 8 9\n4 4 1 1 4 1 2 3 5\n5 4 1 1 4 1 2 10 10\n$ENDELM\n",
     );
     let said = desk.supple(&["inspect", "bad.msh"]);
     print!("{}", said.err);
@@ -28,11 +28,32 @@ fn every_kind_of_fault_is_counted_and_its_first_case_named() {
     for part in [
         "2 elements inverted, first element 1 (volume -1.67e-1 m^3)",
         "2 elements degenerate, first element 3",
-        "1 element with a repeated node, first element 4 (node 2)",
+        "1 element with a repeated node, first element 4 (node 8)",
     ] {
         assert!(said.err.contains(part), "{part}: {}", said.err);
     }
     assert!(said.out.contains("nodes that belong to no element are left out: 1, the first is 5"), "{}", said.out);
+}
+
+/// As Gmsh 2.2 writes a volume of two physical groups. They were called sound, and bent half as far.
+#[test]
+fn tetrahedra_that_are_listed_twice_are_refused() {
+    let desk = Desk::new();
+    let nodes = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 .1 0 0\n3 0 .1 0\n4 0 0 .1\n5 .1 .1 .1\n$EndNodes\n";
+    let elements = "1 4 2 1 1 1 2 3 4\n2 4 2 1 1 2 3 4 5\n3 4 2 2 1 3 1 2 4\n$EndElements\n";
+    desk.write("twice.msh", &format!("{nodes}$Elements\n3\n{elements}"));
+    let scene = bar("[time]\nend = 0.1\n");
+    let (_, rest) = scene.split_once("[material]").unwrap();
+    desk.write("scene.toml", &format!("[mesh]\nfile = \"twice.msh\"\n[material]{rest}"));
+    for asked in [
+        &["inspect", "twice.msh"][..],
+        &["simulate", "scene.toml", "--out", "out"],
+        &["field", "twice.msh", "--spacing", "5", "--out", "a.field"],
+    ] {
+        let said = desk.supple(asked);
+        let part = "twice.msh: elements 0 and 2 (counted from 0) have the same four nodes; list each once (Gmsh";
+        assert!(said.code == 2 && said.err.contains(part), "{asked:?}: {}", said.err);
+    }
 }
 
 #[test]

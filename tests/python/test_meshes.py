@@ -46,6 +46,22 @@ def test_points_of_no_tetrahedron_are_left_out(tmp_path):
     assert len(mesh.points) == 4 and mesh.tets.tolist() == [[0, 1, 2, 3]] and mesh.regions.tolist() == [1]
 
 
+def test_tetrahedra_that_overlap_are_refused(tmp_path, soft):
+    """As Gmsh 2.2 writes a volume of two physical groups: it has twice the mass, and no surface to touch."""
+    mesh = bar()
+    for tets, words in (
+        ([*mesh.tets, mesh.tets[7, [3, 0, 2, 1]]], "elements 7, 432 have the same four nodes: list each once"),
+        ([*mesh.tets, *mesh.tets], "elements 0, 432 have the same four nodes, one of 432 such places"),
+        # A second one on the boundary's face is none; a third at a face within is.
+        ([[0, 1, 2, 3], [1, 2, 3, 4], [1, 2, 3, 5]], "elements 0, 1, 2 share a face, which has two sides"),
+    ):
+        with pytest.raises(supple.InputError, match=words):
+            supple.Scene(supple.Mesh(mesh.points, np.array(tets)), soft)
+    (tmp_path / "two.msh").write_text(MSH.replace("Elements\n1", "Elements\n2") + "40 4 2 1 1 1 2 3 4\n41 4 2 2 1 1 2 3 4\n$EndElements\n")
+    with pytest.raises(supple.InputError, match=r"two.msh: elements 0 and 1 \(counted from 0\) have the same four nodes; list each once"):
+        supple.Mesh.read(tmp_path / "two.msh")
+
+
 REFUSED = [
     ("node.msh", MSH + "40 4 2 1 1 1 2 3 999\n$EndElements\n", ", line 14: element 40 names node 999, which is not one of the file's 5 nodes"),
     ("cut.msh", MSH[:60], ", line "),

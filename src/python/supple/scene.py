@@ -154,6 +154,8 @@ class Scene(library.Sealed):
     ) -> None:
         if not isinstance(mesh, Mesh):
             raise InputError(f"mesh {mesh!r}: it must be a Mesh")
+        if mesh._overlap:
+            raise InputError(mesh._overlap)
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element
