@@ -111,7 +111,7 @@ fn a_body_settles_under_gravity_and_a_pressure_before_time_begins() {
             "gravity = [0.5, 0.0, 0.0]\n{}",
             bar(&format!(
                 "[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[[pressure]]\nplane = {{ axis = \"y\", at = 0.02 }}\npascal = 20.0\n\
-                 [time]\n{time}"
+                 [[point]]\nname = \"tip\"\nat = [0.02, 0.02, 0.05]\n[time]\n{time}"
             ))
         )
     };
@@ -124,6 +124,13 @@ fn a_body_settles_under_gravity_and_a_pressure_before_time_begins() {
     assert!(summary["settled"]["at_rest"] == true && summary["settled"]["remaining_m"].as_f64().unwrap() < 1e-5);
     let first = supple::io::read_mesh(&desk.path("out/frame_0000.vtu")).unwrap();
     assert_eq!(first.points.len(), 54);
+    // Of a point all of the way counts, which settling took it.
+    let way = settled[53][4..7].iter().map(|component| component * component).sum::<f64>().sqrt();
+    let told = summary["points_moved_mm"]["tip"].as_f64().unwrap();
+    let rows = std::fs::read_to_string(desk.path("out/points.csv")).unwrap();
+    println!("{told} mm\n{rows}");
+    assert!((told - 1e3 * way).abs() < 1e-4 && told > 0.1, "{told} mm, {way} m");
+    assert!(rows.contains("\n0.000000,tip,0.020000000,0.020000000,0.05000000") && rows.lines().count() == 5);
     // With damping the same motion ends there.
     let said = desk.simulate(&scene("end = 3.0\n"), &["--force"]);
     assert_eq!(said.code, 0, "{}", said.err);

@@ -164,7 +164,7 @@ fn gaps(outcome: &Outcome) -> Option<Section> {
 fn followed(outcome: &Outcome) -> Option<Section> {
     let moved = outcome.points.moved().into_iter();
     let curves = moved.map(|(name, rows)| (name.to_owned(), in_millimetres(rows))).collect();
-    let caption = "How far each followed point is from where it was at the first frame; the points are in points.csv.";
+    let caption = "How far each followed point is from where it was at rest; the points are in points.csv.";
     over_time("Followed points", "moved by, mm", caption, curves)
 }
 

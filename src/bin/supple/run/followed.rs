@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::scene::points::ScenePoints;
 use supple::state::VecState;
 
-/// The points, and of each frame its time, s, and where they are, m from the centre of the body.
+/// The points, and of the body at rest and each frame the time, s, and where they are, m from the centre of the body.
 #[derive(Default)]
 pub(crate) struct FollowedPoints {
     names: Vec<String>,
@@ -29,7 +29,7 @@ impl FollowedPoints {
         Ok(())
     }
 
-    /// Of each point its name, and at each frame the time, s, and how far it has moved since the first one, m.
+    /// Of each point its name, and at each frame the time, s, and how far it has moved from where it was at rest, m.
     pub(crate) fn moved(&self) -> Vec<(&str, Vec<(f64, f64)>)> {
         let Some((_, first)) = self.rows.first() else { return vec![] };
         let way =

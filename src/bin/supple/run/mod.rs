@@ -101,6 +101,8 @@ impl<'a> Running<'a> {
         let limits = setup.pulls.limit(simulation.scene().view());
         let mut running = Self { setup, simulation, loads, limits, outcome, tick, taken: 0 };
         if let Some(metre) = setup.time.settle {
+            // Points are followed from rest.
+            running.outcome.points.enter(running.simulation.state())?;
             running.settle(metre)?;
         }
         Ok(running)
