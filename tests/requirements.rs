@@ -249,3 +249,27 @@ fn every_fault_of_a_table_is_told_with_its_line() {
         assert!(faults[0].contains(expected), "\"{expected}\" is not in {faults:?}");
     }
 }
+
+/// The numbers of a cell such as "-20 to -22, -24".
+fn numbers(cell: &str) -> Vec<i32> {
+    let number = |text: &str| text.trim().parse::<i32>().unwrap_or_else(|error| panic!("{cell}: {error}"));
+    let part = |part: &str| match part.split_once(" to ") {
+        Some((first, last)) => (number(last)..=number(first)).collect(),
+        None => vec![number(part)],
+    };
+    cell.split(',').flat_map(part).collect()
+}
+
+#[test]
+fn the_table_of_statuses_has_those_of_the_header() {
+    let read = |name: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let (header, page) = (read("include/supple.h"), read("docs/embedding.md"));
+    let (_, known) = header.split_once("enum supple_status").unwrap();
+    let (known, _) = known.split_once('}').unwrap();
+    let known = known.lines().filter_map(|line| line.split_once(" = ")?.1.trim_end_matches(',').parse().ok());
+    let (_, table) = page.split_once("| `SUPPLE_OK` |").unwrap();
+    let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));
+    let told = rows.flat_map(|line| numbers(line.split('|').nth(2).unwrap()));
+    let told: HashSet<i32> = told.chain([0]).collect();
+    assert_eq!(told, known.collect());
+}
