@@ -277,9 +277,21 @@ def test_tissue_that_moves_across_the_border_of_an_image_is_told(sagged, tmp_pat
     from_outside = (sagged.locate(1e-3 * sources.reshape(-1, 3)).distances == 0.0) & (abs(field.values[..., 2]) > 0.5).ravel()
     assert 0 < from_outside.sum() <= field.inside
     words = f"warning: {from_outside.sum()} of the {field.inside} points within the tissue show what was outside the image, and have the label 0: "
-    assert done.returncode == 0 and done.stderr.startswith(words), done.stderr
+    assert done.returncode == 0 and done.stderr.startswith(words) and done.stderr.count("warning") == 1, done.stderr
+    with pytest.warns(RuntimeWarning, match=words[9:]):
+        field.warp(sitk.ReadImage(files[0]), labels=True)
     # At least so many labels are gone.
     assert (sitk.GetArrayFromImage(sitk.ReadImage(files[1])) == 0).sum() >= from_outside.sum()
+
+
+def test_displacements_in_millimetres_are_called_so(sagged):
+    mesh, moved = sagged.scene.mesh, 1e3 * sagged.displacements
+    grid = supple.Grid(tuple(1e3 * mesh.points.min(axis=0).astype(float)), (4.0, 4.0, 4.0), (30, 30, 30))
+    words = "displacements are up to .* m, the tissue is .* m across: are they in metres"
+    with pytest.warns(RuntimeWarning, match=words):
+        supple.displacement_field(mesh, moved, grid)
+    with pytest.raises(supple.InputError, match=f"no point of the grid is within the tissue as it has moved: {words}"):
+        supple.displacement_field(mesh, np.full_like(moved, 5.0), grid)
 
 
 def test_an_image_that_goes_on_beyond_the_field_is_warned_of():

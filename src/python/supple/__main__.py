@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .demo import demo
 from .errors import Error, InputError
-from .images import displacement_field, grid_for_warping, points_from_outside, read_image, write_image
+from .images import displacement_field, grid_for_warping, read_image, write_image
 from .mesh import Mesh
 
 
@@ -54,14 +54,6 @@ def warp(arguments: argparse.Namespace) -> None:
     axes = "RAS" if arguments.ras else "LPS"
     field = displacement_field(mesh, displacements, grid, reach=arguments.reach, axes=axes)
     write_image(field.warp(image, labels=arguments.labels), arguments.out)
-    outside = points_from_outside(mesh, field, image, axes)
-    if outside:
-        value = "the label 0" if arguments.labels else "its least value"
-        warnings.warn(
-            f"{outside} of the {field.inside} points within the tissue show what was outside the image, and have {value}: the tissue moves across "
-            "its border; take an image, or slices, of all that moves there",
-            RuntimeWarning, stacklevel=2,
-        )  # fmt: skip
     if arguments.field is not None:
         field.write(arguments.field)
     lengths = 1e3 * np.linalg.norm(displacements, axis=1)

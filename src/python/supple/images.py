@@ -34,6 +34,8 @@ _STEEPEST = 1.54
 _CELL = 1 / 8
 # How far directions may be from being orthonormal, as the kernel has it.
 _ORTHONORMAL = 1e-3
+# In diagonals of the body: farther nodes do not move.
+_FAR = 10.0
 # What an image shows of a motion that ends at a border, mm.
 _VISIBLE = 0.01
 
@@ -111,6 +113,8 @@ class Field:
     grid: Grid
     values: NDArray[np.float32]
     inside: int
+    # The tissue at rest and its axes, for what an image of it lacks.
+    _tissue: tuple[Mesh, str] | None = dataclasses.field(default=None, repr=False, compare=False)
 
     def image(self) -> Any:
         """As a SimpleITK image of three float64 a point."""
@@ -148,6 +152,14 @@ class Field:
             warnings.warn(
                 f"the image goes on {beyond:.3g} mm beyond the grid of the field, at whose border it moves by {lost:.3g} mm: "
                 "beyond it nothing moves; make the field on the grid of the image, or with a reach that ends within its own",
+                RuntimeWarning, stacklevel=2,
+            )  # fmt: skip
+        missing = _points_from_outside(self, image)
+        if missing:
+            value = "the label 0" if labels else "its least value"
+            warnings.warn(
+                f"{missing} of the {self.inside} points within the tissue show what was outside the image, and have {value}: the tissue moves across "
+                "its border; take an image, or slices, of all that moves there",
                 RuntimeWarning, stacklevel=2,
             )  # fmt: skip
         outside = 0.0 if labels else float(np.fmin.reduce(sitk.GetArrayViewFromImage(image), axis=None))
@@ -210,19 +222,28 @@ def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, fl
         library.pointer("float", values), values.size, covered, error,
     )  # fmt: skip
     library.checked(status, error, "the field")
+    across = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    is_far = largest > _FAR * across
+    far = f"displacements are up to {largest:.4g} m, the tissue is {across:.3g} m across: are they in metres? (1 mm is 0.001 m)"
+    if is_far and covered[0] > 0:
+        warnings.warn(far, RuntimeWarning, stacklevel=3)
     if covered[0] == 0:
+        if is_far:
+            raise InputError(f"no point of the grid is within the tissue as it has moved: {far}")
         low, high = 1e3 * signs * mesh.points.min(axis=0), 1e3 * signs * mesh.points.max(axis=0)
         raise InputError(
             f"no point of the grid is within the tissue, which lies from {np.minimum(low, high).round(1).tolist()} to "
             f"{np.maximum(low, high).round(1).tolist()} mm (LPS): is the mesh in metres, and in {axes} axes? Or the grid too coarse?"
         )
     values *= (1e3 * signs).astype(np.float32)
-    return Field(kind, grid, values, int(covered[0]))
+    return Field(kind, grid, values, int(covered[0]), (mesh, axes))
 
 
-def points_from_outside(mesh: Mesh, field: Field, image: Any, axes: str) -> int:
+def _points_from_outside(field: Field, image: Any) -> int:
     """How many points of an inverse field are within the tissue, and their material comes from outside the image: more than half a voxel."""
-    grid, of_image, found = field.grid, Grid.of(image), 0
+    if field._tissue is None:
+        return 0
+    (mesh, axes), grid, of_image, found = field._tissue, field.grid, Grid.of(image), 0
     corners = 1e3 * _SIGNS[axes] * np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     for layer, values in enumerate(field.values):
