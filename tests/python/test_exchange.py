@@ -1,5 +1,7 @@
 """Tissue that changes while it moves: resection, ablation, and what is refused."""
 
+import warnings
+
 import numpy as np
 import pytest
 import supple
@@ -151,6 +153,8 @@ def test_what_cannot_be_is_refused_and_the_motion_goes_on(soft):
     simulation, undisturbed = (supple.Simulation(scene_of(mesh, soft), gravity=(1.0, 0.0, 0.0)) for _ in range(2))
     for each in (simulation, undisturbed):
         each.advance(0.05)
+    driven = supple.Simulation(supple.Scene(mesh, soft, moved=[0]))
+    driven.set_motions([0], (0.001, 0.0, 0.0))
     bad = supple.Material("neo-hookean", c=float("nan"), d=1.0, density=1000.0)
     for wrong, words in [
         (lambda: simulation.exchange(scene_of(other, soft)), "exchange: .*node"),
@@ -161,12 +165,23 @@ def test_what_cannot_be_is_refused_and_the_motion_goes_on(soft):
         (lambda: simulation.ablate([], soft, 1.0), "there are no elements"),
         (lambda: simulation.ablate([0], soft, -1.0), "-1.0 s"),
         (lambda: simulation.ablate([0], bad, 1.0), "finite and positive"),
+        (lambda: driven.exchange(scene_of(mesh, soft)), r"exchange: node .* has a motion, .* set_motions\(\[\], \(0, 0, 0\)\)"),
     ]:
         with pytest.raises(supple.InputError, match=words):
             wrong()
     for each in (simulation, undisturbed):
         each.advance(0.05)
     assert (simulation.displacements == undisturbed.displacements).all()
+
+
+def test_an_ablation_tells_of_what_it_leaves(soft):
+    simulation = supple.Simulation(scene_of(bar(), soft))
+    other = supple.Material.from_moduli(9000.0, 0.45, density=5000.0, prony=[[0.5, 0.1]], fibres=[1e3, 1.0])
+    with pytest.warns(RuntimeWarning, match="ablate: density and prony and fibres of the material differ .* exchange a scene of it"):
+        simulation.ablate([0], other, 0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.ablate([1], supple.Material.from_moduli(9000.0, 0.45, density=soft.density), 0.1)
 
 
 def test_reset_and_restore_go_back_in_motion_alone(soft):

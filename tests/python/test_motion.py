@@ -97,6 +97,8 @@ def test_weights_are_those_of_learned_steps(lobe, liver):
     scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
     with pytest.raises(supple.InputError, match="weights are those of learned steps; long steps have none"):
         supple.Simulation(scene, "long", step=2e-3, weights=ROOT / "weights" / "compact-10.weights")
+    with pytest.raises(supple.InputError, match="damping 3 1/s: the network learned with"):
+        supple.Simulation(scene, "learned", weights=ROOT / "weights" / "compact-10.weights", damping=3.0)
     with pytest.raises(supple.InputError, match="learned: .*other-shape"):
         supple.Simulation(scene, "learned", weights=ROOT / "tests" / "data" / "other-shape.weights")
 

@@ -134,6 +134,8 @@ def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
 
 
 REFUSED = [
+    (lambda mesh, soft: supple.Scene(supple.Mesh([*mesh.points, [0, 0, 1]], mesh.tets), soft), "node 144 belongs to no element.* numpy.unique"),
+    (lambda mesh, soft: supple.Simulation(supple.Scene(mesh, soft), "long", cells=(2000,) * 3), "GiB of memory are needed, .* fewer cells"),
     (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2.7, 1, 1]), r"cells \[2.7, 1, 1\]: they must be three whole numbers, at least 1"),
     (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], [2, 0, 1]), r"cells \[2, 0, 1\]"),
     (lambda mesh, soft: supple.Mesh.box([1.0, 1.0, 1.0], 3), "cells 3: they must be three"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +43,11 @@ def made_of(scene: Scene, settings: Any, what: str) -> tuple[library.Memory, Any
     """A simulation at rest, with its memory."""
     size, error, made = ffi.new("size_t *"), library.new_error(), ffi.new("supple_sim **")
     library.checked(lib.supple_sim_size(scene._config, settings, size, error), error, what)
-    memory = library.Memory(size[0])
+    try:
+        memory = library.Memory(size[0])
+    except MemoryError:
+        remedy = "; take fewer cells" if settings.cells[0] else ""
+        raise InputError(f"{what}: {size[0] / 2**30:.3g} GiB of memory are needed, which are not there{remedy}") from None
     library.checked(lib.supple_sim_setup(memory.pointer, size[0], scene._config, settings, made, error), error, what)
     return memory, made[0]
 
@@ -59,7 +64,14 @@ def exchanged(simulation: Simulation, scene: Scene) -> None:
         former, contact = contact, Contact(scene.mesh.points, scene._boundary, objects.scene, contact.triangles, contact.grips)
         library.checked(lib.supple_contact_carry_on(contact.raw, objects.scene, former.raw), what="instruments")
         contact._rows = former._rows
-    library.checked(lib.supple_sim_carry_on(sim, simulation._sim, settings, error), error, "exchange")
+    status = lib.supple_sim_carry_on(sim, simulation._sim, settings, error)
+    if status == lib.SUPPLE_E_NOT_HELD:
+        raise InputError(
+            f"exchange: node {error.node} has a motion, and is none of the moved nodes of the new scene: move it there as well, "
+            "or end all motions before, set_motions([], (0, 0, 0))",
+            status, node=int(error.node),
+        )  # fmt: skip
+    library.checked(status, error, "exchange")
     if contact is not None and contact.list:
         library.checked(lib.supple_set_contact(objects.loads, contact.raw))
     simulation._scene, simulation._contact = scene, contact
@@ -95,12 +107,25 @@ def ablated(simulation: Simulation, elements: ArrayLike, material: Material, sec
         raise InputError(f"ablate within {seconds} s: it must be zero or more")
     if not len(numbers):
         raise InputError("ablate: there are no elements")
+    _, rows, series, fibres, _ = scene._tissues_of(material)
+    parts = np.unique(scene._tissue_of_element[numbers])
+    differ = [
+        name
+        for name, given, has in (("density", rows["density"], scene._tissues["density"]), ("prony", series, scene._prony), ("fibres", fibres, scene._fibres))
+        if (name == "density" or given.tobytes().strip(b"\0")) and (has[parts] != given[0]).any()
+    ]
+    if differ:
+        warnings.warn(
+            f"ablate: {' and '.join(differ)} of the material differ from those of the tissue, which stay: only constants change; "
+            "for all of a material exchange a scene of it",
+            RuntimeWarning, stacklevel=4,
+        )  # fmt: skip
     end = np.zeros(4, np.float32)
     end[: len(material.constants)] = list(material.constants.values())
     if not (np.isfinite(end).all() and (end[: len(material.constants)] > 0.0).all()):
         raise InputError(f"ablate: {material!r}: constants must be finite and positive")
     # Of each tissue its ablated part becomes one of its own.
-    of_element, parts = scene._tissue_of_element.copy(), np.unique(scene._tissue_of_element[numbers])
+    of_element = scene._tissue_of_element.copy()
     first = len(scene._tissues)
     of_element[numbers] = first + np.searchsorted(parts, scene._tissue_of_element[numbers])
     divided = scene._divided(parts, of_element)

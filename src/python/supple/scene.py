@@ -156,6 +156,15 @@ class Scene(library.Sealed):
             raise InputError(f"mesh {mesh!r}: it must be a Mesh")
         if mesh._overlap:
             raise InputError(mesh._overlap)
+        is_used = np.zeros(len(mesh.points), bool)
+        is_used[mesh.tets] = True
+        if not is_used.all():
+            first = int(is_used.argmin())
+            raise InputError(
+                f"the scene: node {first} belongs to no element, one of {(~is_used).sum()} such nodes: leave them out, "
+                "used, tets = numpy.unique(mesh.tets, return_inverse=True), supple.Mesh(mesh.points[used], tets.reshape(-1, 4))",
+                lib.SUPPLE_E_MESH_UNUSED_NODE, node=first,
+            )  # fmt: skip
         if element not in ELEMENTS:
             raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
         self.mesh, self.material, self.element = mesh, material, element

@@ -150,7 +150,7 @@ class Simulation(library.Sealed):
     method : "exact"; "long" beyond the critical step; "auto", exact and long steps whose length keeps a tolerance; "learned"
     step : s; of exact steps, those around a network's included, 0.9 of the critical one unless given, and shorter where that falls; of
         long ones 20 times the critical one; of automatic ones the longest
-    damping : 1/s; learned steps take that of their training
+    damping : 1/s; learned steps have that of their training, and refuse another
     tolerance : mean error (m) that automatic steps keep, half a millimetre or less in bodies below 10 cm unless given, and that the
         guard allows, a fifth of the motion unless given
     weights : file of the network, for learned steps
@@ -223,6 +223,9 @@ class Simulation(library.Sealed):
         self._traction: tuple[NDArray[np.uint32], NDArray[np.float32], float] | None = None
         self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
+        trained = None if self.network is None else self.network["damping"]
+        if trained is not None and damping and abs(damping - trained) > 1e-6 * trained:
+            raise InputError(f"damping {damping:g} 1/s: the network learned with {trained:g} 1/s, and knows no other: leave it out")
         self.gravity = gravity
         self._is_made = True
 
