@@ -12,6 +12,14 @@ fn a_sound_mesh_is_described() {
     for part in ["2049", "8201", "2516", "288.", "radius ratio", "sound"] {
         assert!(said.out.contains(part), "{part}: {}", said.out);
     }
+    assert!(!said.out.contains("parts"), "{}", said.out);
+    let nodes = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0 0 0\n6 -1 0 0\n7 0 0 1\n8 0 1 0\n";
+    desk.write(
+        "two.msh",
+        &format!("$NOD\n8\n{nodes}$ENDNOD\n$ELM\n2\n1 4 1 1 4 1 2 3 4\n2 4 1 1 4 5 6 7 8\n$ENDELM\n"),
+    );
+    let said = desk.supple(&["inspect", "two.msh"]);
+    assert!(said.out.contains("2 that share no node; merge nodes"), "{}{}", said.out, said.err);
 }
 
 #[test]

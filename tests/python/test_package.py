@@ -133,6 +133,28 @@ def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
         simulation.advance(1e-3)
 
 
+def said_in(what):
+    """The warnings of a call."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        what()
+    return [str(each.message) for each in said]
+
+
+def test_a_part_that_nothing_holds_is_warned_of(soft):
+    one = bar()
+    points, tets = np.concatenate([one.points, one.points + [0, 0, 0.06]]), np.concatenate([one.tets, one.tets + len(one.points)])
+    scene = supple.Scene(supple.Mesh(points, tets), soft, fixed=points[:, 2] < 1e-9)
+    words = "the mesh has 2 parts that share no node, and nothing holds 1 of them, of up to 144 nodes"
+    simulation = supple.Simulation(scene)
+    assert said_in(lambda: simulation.advance(1e-4))[0].startswith(words)
+    simulation.pull(points[-1:], radius=0.01)
+    assert simulation.remarks() == [], "a pull holds it"
+    simulation = supple.Simulation(scene)
+    simulation.remove(np.arange(len(one.tets), len(tets)))
+    assert simulation.remarks() == []
+
+
 REFUSED = [
     (lambda mesh, soft: supple.Scene(supple.Mesh([*mesh.points, [0, 0, 1]], mesh.tets), soft), "node 144 belongs to no element.* numpy.unique"),
     (lambda mesh, soft: supple.Simulation(supple.Scene(mesh, soft), "long", cells=(2000,) * 3), "GiB of memory are needed, .* fewer cells"),

@@ -225,7 +225,7 @@ class Scene(library.Sealed):
     def _without(self, removed: NDArray[np.uint8]) -> Scene:
         """Another scene of the same mesh and supports."""
         made = copy.copy(self)
-        for of_elements in ("_boundary", "_triangles"):
+        for of_elements in ("_boundary", "_triangles", "_parts"):
             made.__dict__.pop(of_elements, None)
         made._removed = removed
         made._build()
@@ -317,6 +317,20 @@ class Scene(library.Sealed):
         corners = self.mesh.points[self.mesh.tets].astype(np.float64)
         pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
         return float(np.mean([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs]))
+
+    @functools.cached_property
+    def _parts(self) -> NDArray[np.intp]:
+        """For each node the least one of the part of the tissue that it hangs together with."""
+        tets, least = self.mesh.tets[self._removed == 0], np.arange(len(self.mesh.points))
+        while True:
+            of_tets = least[tets]
+            lower = least.copy()
+            np.minimum.at(lower, of_tets, of_tets.min(axis=1, keepdims=True))
+            while (lower[lower] != lower).any():
+                lower = lower[lower]
+            if (lower == least).all():
+                return least
+            least = lower
 
     def _supports_of(self, fixed: ArrayLike, moved: ArrayLike, axes: str) -> NDArray[np.uint32]:
         nodes = len(self.mesh.points)

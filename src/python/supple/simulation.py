@@ -532,7 +532,28 @@ class Simulation(library.Sealed):
             said.append(f"{place}{words} ({figures})" if figures else f"{place}{words}")
         if not len(self.scene._supports) and not self._pull_groups:
             said.append("no node is fixed, moved or pulled: the body is free")
-        return said
+        return said + self._loose_parts()
+
+    def _loose_parts(self) -> list[str]:
+        """Parts of the tissue that nothing holds, next to some that are held: meshes that were put together, and their nodes not."""
+        part, held = self.scene._parts, self.scene._supports[:, 0]
+        if self._pull_memory:
+            held = np.concatenate([held, *(self._pulled_nodes(group) for group in self._pull_groups)])
+        tissue = np.unique(self.scene.mesh.tets[self.scene._removed == 0])
+        parts, nodes = np.unique(part[tissue], return_counts=True)
+        is_loose = ~np.isin(parts, part[held])
+        if not is_loose.any() or is_loose.all():
+            return []
+        return [
+            f"the mesh has {len(parts)} parts that share no node, and nothing holds {is_loose.sum()} of them, of up to {nodes[is_loose].max()} nodes: "
+            "merge nodes that lie on each other, if they belong together"
+        ]
+
+    def _pulled_nodes(self, group: Wanted) -> NDArray[np.intp]:
+        """Those within the radius of a point."""
+        points = self.scene.mesh.points
+        near = [np.flatnonzero(np.linalg.norm(points - each, axis=1) < group.radius) for each in group.points]
+        return np.concatenate(near) if near else np.zeros(0, np.intp)
 
     def _warn_once(self) -> None:
         if self._is_warned:

@@ -15,6 +15,13 @@ pub(crate) fn describe(body: &Body) -> Result<(), Problem> {
     row("nodes", mesh.points.len());
     row("tetrahedra", mesh.tets.len());
     row("boundary triangles", body.boundary().len());
+    let parts = body.parts().into_iter().zip(0..).filter(|(least, node)| least == node).count();
+    if parts > 1 {
+        row(
+            "parts",
+            format!("{parts} that share no node; merge nodes that lie on each other, if they belong together"),
+        );
+    }
     if !mesh.regions.is_empty() {
         row("region tags", region_tags(&mesh.regions));
     }

@@ -134,6 +134,26 @@ impl Body {
         volumes
     }
 
+    /// For each node the least one of the part of the mesh that it hangs together with.
+    pub(crate) fn parts(&self) -> Vec<u32> {
+        // Each node's way to the least node of its part.
+        let mut towards: Vec<u32> = (0..self.local.len() as u32).collect();
+        let root = |towards: &mut Vec<u32>, mut node: u32| {
+            while towards[node as usize] != node {
+                towards[node as usize] = towards[towards[node as usize] as usize];
+                node = towards[node as usize];
+            }
+            node
+        };
+        for &[first, ref others @ ..] in &self.mesh.tets {
+            for &other in others {
+                let [a, b] = [first, other].map(|node| root(&mut towards, node));
+                towards[a.max(b) as usize] = a.min(b);
+            }
+        }
+        (0..towards.len() as u32).map(|node| root(&mut towards, node)).collect()
+    }
+
     /// Triangles that belong to one element only.
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
         boundary(self.mesh.tets.iter().copied())

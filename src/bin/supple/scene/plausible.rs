@@ -47,34 +47,26 @@ pub(crate) fn warnings(
     let of_supports = of_supports(elements, |node| held.get(node) == Some(&true));
     let of_others = of_gravity(gravity).into_iter().chain(of_supports).chain(proportions.of_forces(forces));
     let of_others = of_others.map(|remark| Problem::in_file(file.path(), remark));
-    of_mesh.chain(of_tissues).chain(of_others).chain(of_motions).map(|problem| problem.to_string()).collect()
+    of_mesh
+        .chain(of_tissues)
+        .chain(of_others)
+        .chain(of_motions)
+        .chain(of_time)
+        .map(|problem| problem.to_string())
+        .collect()
 }
 
 /// A part of the mesh that shares no node with the others and that nothing holds, next to one that is held: meshes that were
 /// put together and whose nodes were not merged.
 pub(crate) fn loose_part(file: &SceneFile, body: &Body, held: impl Iterator<Item = u32>) -> Option<String> {
-    // Each node's way to the least node of its part.
-    let mut towards: Vec<u32> = (0..body.local.len() as u32).collect();
-    let root = |towards: &mut Vec<u32>, mut node: u32| {
-        while towards[node as usize] != node {
-            towards[node as usize] = towards[towards[node as usize] as usize];
-            node = towards[node as usize];
-        }
-        node
-    };
-    for &[first, ref others @ ..] in &body.mesh.tets {
-        for &other in others {
-            let [a, b] = [first, other].map(|node| root(&mut towards, node));
-            towards[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let mut holds = vec![false; towards.len()];
+    let part = body.parts();
+    let mut holds = vec![false; part.len()];
     for node in held {
-        holds[root(&mut towards, node) as usize] = true;
+        holds[part[node as usize] as usize] = true;
     }
-    let mut nodes = vec![0_usize; towards.len()];
-    for node in 0..towards.len() as u32 {
-        nodes[root(&mut towards, node) as usize] += 1;
+    let mut nodes = vec![0_usize; part.len()];
+    for &least in &part {
+        nodes[least as usize] += 1;
     }
     let parts: Vec<_> = nodes.into_iter().zip(holds).filter(|(nodes, _)| *nodes > 0).collect();
     let loose: Vec<_> = parts.iter().filter(|(_, holds)| !holds).map(|(nodes, _)| *nodes).collect();
