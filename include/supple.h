@@ -329,6 +329,16 @@
 #define SUPPLE_REMARK_INSIDE 14
 
 /**
+ * Instrument `index` stays `value` m away from the body, which is `limit` m across: is its pose in metres?
+ */
+#define SUPPLE_REMARK_FAR 15
+
+/**
+ * The target of pull `index` is `value` m away from its point, the body `limit` m across: is it in metres?
+ */
+#define SUPPLE_REMARK_FAR_TARGET 16
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
  * afterwards, that forces are those of the step that was refused, or zero after a critical step, that a supple_large

@@ -2,8 +2,8 @@
 //! same, but remarked upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa),
 //! Poisson's ratio, gravity (m/s^2), forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`,
 //! the speed of shear waves at rest in the softest tissue), supports counted from one, a network that learned
-//! another tissue, instruments that pass between the nodes that they can touch or start within the body, and pulls of
-//! held nodes.
+//! another tissue, instruments that pass between the nodes that they can touch, start within the body or stand far away from it,
+//! and pulls of held nodes and to far targets.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -34,6 +34,8 @@ const POISSON_RATIOS: RangeInclusive<f64> = 0.0..=0.499_99;
 const MOST_GRAVITY: f64 = 1e3;
 /// Share of the diagonal by which a node may jump in the first step.
 const MOST_JUMP: f64 = 0.05;
+/// In diagonals of the body: farther away an instrument or a target is not in metres.
+const FAR: f64 = 10.0;
 /// Faces of elements with three held nodes that a support has at least, to be told from single nodes.
 const FACES_OF_A_SUPPORT: u32 = 4;
 
@@ -88,6 +90,20 @@ pub enum Remark {
     Inside,
     /// A pull all of whose nodes are held where it would move them.
     HeldPull,
+    /// An instrument that is so far from the body where its motion begins and ends.
+    Far {
+        /// From the middle of the body, m.
+        metre: f64,
+        /// The diagonal of the body's box, m.
+        diagonal: f64,
+    },
+    /// A pull to a target that is so far from its point.
+    FarTarget {
+        /// How far, m.
+        metre: f64,
+        /// The diagonal of the body's box, m.
+        diagonal: f64,
+    },
 }
 
 impl fmt::Display for Remark {
@@ -144,6 +160,14 @@ impl fmt::Display for Remark {
                 "an instrument starts within the body, where it touches nothing and pushes the surface from within; let its path begin outside",
             ),
             Self::HeldPull => f.write_str("all nodes of a pull are held: it moves nothing"),
+            Self::Far { metre, diagonal } => write!(
+                f,
+                "an instrument is {metre:.4} m away from the body, which is {diagonal:.3} m across (1 mm is 0.001 m)"
+            ),
+            Self::FarTarget { metre, diagonal } => write!(
+                f,
+                "a pull's target is {metre:.4} m away from its point, the body is {diagonal:.3} m across (1 mm is 0.001 m)"
+            ),
         }
     }
 }
@@ -221,6 +245,18 @@ pub fn of_size(diagonal: f64) -> Option<Remark> {
     (!DIAGONALS.contains(&diagonal)).then_some(Remark::Size(diagonal))
 }
 
+/// Of an instrument that comes no nearer to a body with this diagonal than so many metres.
+#[must_use]
+pub fn of_distance(metre: f64, diagonal: f64) -> Option<Remark> {
+    (metre > FAR * diagonal).then_some(Remark::Far { metre, diagonal })
+}
+
+/// Of a pull whose target is so many metres away from its point, at a body with this diagonal.
+#[must_use]
+pub fn of_target(metre: f64, diagonal: f64) -> Option<Remark> {
+    (metre > FAR * diagonal).then_some(Remark::FarTarget { metre, diagonal })
+}
+
 /// Of the mass of a body, kg.
 #[must_use]
 pub fn of_mass(mass: f64) -> Option<Remark> {
@@ -288,8 +324,8 @@ pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'
     (!(is_same_law && tissues_of(scene.material).all(is_same))).then_some(Remark::OtherTissue)
 }
 
-/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, or starts within
-/// the body, of a scene that was built from these points, m.
+/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, starts within
+/// the body or is far away from it, of a scene that was built from these points, m.
 pub fn of_contact<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
@@ -297,7 +333,11 @@ pub fn of_contact<M: ElementMaterial>(
     mut say: impl FnMut(usize, Remark),
 ) {
     let nodes = |(tile, lane): (&ElementTile, usize)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane) as u32);
+    let (low, high) = extent(points);
+    let middle = (0.5 * (low + high)).as_vec3().to_array();
     for (index, instrument) in contact.instruments().iter().enumerate() {
+        let nearest = instrument.times.map(|time| f64::from(instrument.distance(middle, time)));
+        of_distance(nearest[0].min(nearest[1]), diagonal(points)).into_iter().for_each(|remark| say(index, remark));
         // Of a shape whose middle is outside itself, as of a plane, nothing is known.
         let within =
             instrument.axis().into_iter().filter(|&point| instrument.distance(point, instrument.times[0]) < 0.0);
@@ -338,12 +378,23 @@ pub fn of_pull(held: impl Iterator<Item = Axes>, along: [f32; 3]) -> Option<Rema
     (all && nodes > 0).then_some(Remark::HeldPull)
 }
 
-/// Calls `say` with a remark and the number of each pull that moves nothing.
-pub fn of_pulls<M>(scene: SceneView<'_, M>, pulls: &Pulls<'_>, mut say: impl FnMut(usize, Remark)) {
+/// Calls `say` with a remark and the number of each pull that moves nothing, or to a far target, in a scene that was built from these
+/// points, m.
+pub fn of_pulls<M>(
+    scene: SceneView<'_, M>,
+    points: &[[f32; 3]],
+    pulls: &Pulls<'_>,
+    mut say: impl FnMut(usize, Remark),
+) {
+    let diagonal = diagonal(points);
     for (index, pull) in pulls.pulls().iter().enumerate().filter(|(_, pull)| pull.stiffness > 0.0) {
         let held = pulls.nodes_of(pull).iter().filter(|pulled| pulled.weight != 0.0);
         let held = held.map(|pulled| scene.held(pulled.node as usize));
-        of_pull(held, pull.along).into_iter().for_each(|remark| say(index, remark));
+        let metre = length([0, 1, 2].map(|axis| pull.to[axis] - pull.at[axis]));
+        of_pull(held, pull.along)
+            .or_else(|| of_target(metre, diagonal))
+            .into_iter()
+            .for_each(|remark| say(index, remark));
     }
 }
 
@@ -362,13 +413,19 @@ fn tissues_of<M: Material>(material: &M) -> impl Iterator<Item = Tissue<M::Law>>
     one.into_iter().chain(several)
 }
 
-/// The diagonal of the box around the points, m.
-fn diagonal(points: &[[f32; 3]]) -> f64 {
+/// Least and largest coordinates, m.
+fn extent(points: &[[f32; 3]]) -> (DVec3, DVec3) {
     let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
     for point in points {
         let point = DVec3::from_array(point.map(f64::from));
         (low, high) = (low.min(point), high.max(point));
     }
+    (low, high)
+}
+
+/// The diagonal of the box around the points, m.
+fn diagonal(points: &[[f32; 3]]) -> f64 {
+    let (low, high) = extent(points);
     if points.is_empty() { 0.0 } else { libm::sqrt((high - low).length_squared()) }
 }
 
@@ -405,6 +462,14 @@ mod tests {
         assert_eq!(of_pull([Axes::XYZ, Axes::X].into_iter(), [2.0, 0.0, 0.0]), Some(Remark::HeldPull));
         assert_eq!(of_pull([Axes::XYZ, Axes::X].into_iter(), [2.0, 1.0, 0.0]), None);
         assert_eq!(of_pull([].into_iter(), free), None);
+    }
+
+    #[test]
+    fn lengths_in_millimetres_are_named() {
+        assert_eq!((of_distance(0.3, 0.06), of_target(0.3, 0.06)), (None, None));
+        assert!(matches!(of_distance(65.0, 0.06), Some(Remark::Far { .. })));
+        assert!(matches!(of_target(10.0, 0.06), Some(Remark::FarTarget { .. })));
+        assert_eq!(of_target(f64::NAN, 0.06), None, "an absent target");
     }
 
     #[test]

@@ -44,6 +44,10 @@ pub const SUPPLE_REMARK_HELD_PULL: u32 = 13;
 /// Instrument `index` starts within the body, where it touches nothing and pushes the surface from within: let its path
 /// begin outside.
 pub const SUPPLE_REMARK_INSIDE: u32 = 14;
+/// Instrument `index` stays `value` m away from the body, which is `limit` m across: is its pose in metres?
+pub const SUPPLE_REMARK_FAR: u32 = 15;
+/// The target of pull `index` is `value` m away from its point, the body `limit` m across: is it in metres?
+pub const SUPPLE_REMARK_FAR_TARGET: u32 = 16;
 
 /// What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
 #[repr(C)]
@@ -76,6 +80,8 @@ impl supple_remark {
             Remark::Thin(thickness) => (SUPPLE_REMARK_THIN, index, thickness as f64, 0.0),
             Remark::Inside => (SUPPLE_REMARK_INSIDE, index, 0.0, 0.0),
             Remark::HeldPull => (SUPPLE_REMARK_HELD_PULL, index, 0.0, 0.0),
+            Remark::Far { metre, diagonal } => (SUPPLE_REMARK_FAR, index, metre, diagonal),
+            Remark::FarTarget { metre, diagonal } => (SUPPLE_REMARK_FAR_TARGET, index, metre, diagonal),
         };
         Self { kind, index, value, limit }
     }
@@ -127,7 +133,7 @@ pub unsafe extern "C" fn supple_remarks(
             plausibility::of_contact(scene, points, &touching.contact, &mut say);
         }
         if let Some(pulls) = asked.pulls() {
-            plausibility::of_pulls(scene, pulls, &mut say);
+            plausibility::of_pulls(scene, points, pulls, &mut say);
         }
         let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
         network.into_iter().for_each(|remark| say(0, remark));
@@ -158,6 +164,8 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
             c"an instrument thinner than edges of the surface are long: it needs the surface's triangles"
         }
         SUPPLE_REMARK_INSIDE => c"an instrument that starts within the body: let its path begin outside",
+        SUPPLE_REMARK_FAR => c"an instrument far away from the body: is it in metres?",
+        SUPPLE_REMARK_FAR_TARGET => c"a pull to a target far away from its point: is it in metres?",
         SUPPLE_REMARK_HELD_PULL => c"a pull all of whose nodes are held: it moves nothing",
         _ => c"?",
     };

@@ -783,7 +783,7 @@ static void remarks(supple_scene_config config) {
     DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
     CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
     CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
-    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_INSIDE; kind++) {
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_FAR_TARGET; kind++) {
         CHECK(strlen(supple_remark_text(kind)) > 10);
     }
     CHECK(strcmp(supple_remark_text(0), "?") == 0);

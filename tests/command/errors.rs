@@ -196,6 +196,7 @@ fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
     let whole = bar(&format!("{FIX}{TIME}"));
     let with = |more: &str| bar(&format!("{FIX}{more}{TIME}"));
     let end = "[[move]]\nplane = { axis = \"z\", at = 0.05 }\n";
+    let pull = "[[pull]]\npoint = [0.01, 0.01, 0.05]\nstiffness = 10.0\n";
     let cases = [
         (
             whole.replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]"),
@@ -242,6 +243,39 @@ fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
         (
             with("[[pull]]\npoint = [0.01, 0.01, 0.0]\nradius = 0.002\nstiffness = 10.0\n"),
             "line 13: all nodes of a pull are held: it moves nothing",
+        ),
+        (
+            with(&format!("{pull}path = [[0.0, 10.0, 10.0, 50.0]]\n")),
+            "line 16: a pull's target is 51.9096 m away from its point, the body is 0.057 m across (1 mm is 0.001 m)",
+        ),
+        (
+            with(&format!("{pull}path = [[0.0, 0.01, 0.01, 0.05], [200.0, 0.01, 0.01, 0.051]]\n")),
+            "line 16: the path of a target goes on to 200 s, and the simulation ends at",
+        ),
+        (
+            with(&format!("{pull}radius = 12.0\n")),
+            "line 16: radius is 12 m, the body is 0.057 m across: all of it is pulled (1 mm is 0.001 m)",
+        ),
+        (
+            with(
+                "[[instrument]]\nshape = \"sphere\"\nradius = 5.0\npath = [[0.0, 10.0, 10.0, 70.0], [30.0, 10.0, 10.0, 50.0]]\n",
+            ),
+            "line 13: an instrument is 46.9",
+        ),
+        (
+            with(
+                "[[instrument]]\nshape = \"sphere\"\nradius = 5.0\npath = [[0.0, 10.0, 10.0, 70.0], [30.0, 10.0, 10.0, 50.0]]\n",
+            ),
+            "line 13: the path of this instrument goes on to 30 s, and the simulation ends at",
+        ),
+        (
+            with(&format!("{}newton = [0.0, 0.01, 0.0]\nramp = 100.0\n", end.replace("move", "force"))),
+            "line 16: a ramp goes on to 100 s, and the simulation ends at",
+        ),
+        (format!("{whole}settle = 0.1\n"), "settle is 0.1 m, the body is 0.057 m across (1 mm is 0.001 m)"),
+        (
+            format!("{whole}method = \"auto\"\ntolerance = 0.5\n"),
+            "tolerance is 0.5 m, the body is 0.057 m across (1 mm is 0.001 m)",
         ),
     ];
     for (scene, words) in cases {

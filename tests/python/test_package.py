@@ -141,6 +141,29 @@ def said_in(what):
     return [str(each.message) for each in said]
 
 
+def test_lengths_in_millimetres_are_warned_of_once(soft):
+    mesh = bar()
+    top = np.flatnonzero(mesh.points[:, 2] > 0.059)
+    scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-9, moved=top)
+
+    def made(**asked):
+        return supple.Simulation(scene, damping=20.0, **asked)
+
+    simulation = made(method="auto", tolerance=0.5)
+    assert simulation.remarks() == ["tolerance 0.5 m is large for a body that is 0.0663 m across: is it in metres? (1 mm is 0.001 m)"]
+    assert [words[:36] for words in said_in(lambda: made().settle(0.1))] == ["settle: to within 0.1 m is large for"]
+    assert "displacements: up to 5 m is large" in said_in(lambda: made().set_displacements(np.full_like(mesh.points, [5, 0, 0])))[0]
+    assert "pulls: radius 12 m is large" in said_in(lambda: made().pull(mesh.points[:1], radius=12.0))[0]
+    # As many motions and targets as there are nodes, and what is after them.
+    simulation = made()
+    simulation.set_motions(top, [0.0, 0.0, 5.0], ramp=100.0)
+    simulation.pull(mesh.points[top], 1e3 * mesh.points[top])
+    simulation.set_instruments([supple.Instrument.sphere(5.0, (0.0, 0.0, 70.0))])
+    said = simulation.remarks()
+    assert len(top) == 16 and [words.split(":")[0] for words in said] == ["motion 0", "instrument 0", "pull 0"], said
+    assert said[0].endswith(", the first of 16") and "far away from its point" in said[2] and "far away from the body" in said[1]
+
+
 def test_a_part_that_nothing_holds_is_warned_of(soft):
     one = bar()
     points, tets = np.concatenate([one.points, one.points + [0, 0, 0.06]]), np.concatenate([one.tets, one.tets + len(one.points)])

@@ -319,6 +319,11 @@ class Scene(library.Sealed):
         return float(np.mean([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs]))
 
     @functools.cached_property
+    def _across(self) -> float:
+        """The diagonal of the body's box, m."""
+        return float(np.linalg.norm(np.ptp(self.mesh.points, axis=0)))
+
+    @functools.cached_property
     def _parts(self) -> NDArray[np.intp]:
         """For each node the least one of the part of the tissue that it hangs together with."""
         tets, least = self.mesh.tets[self._removed == 0], np.arange(len(self.mesh.points))

@@ -51,12 +51,16 @@ _PLACES = {
     lib.SUPPLE_REMARK_THIN: "instrument",
     lib.SUPPLE_REMARK_INSIDE: "instrument",
     lib.SUPPLE_REMARK_HELD_PULL: "pull",
+    lib.SUPPLE_REMARK_FAR: "instrument",
+    lib.SUPPLE_REMARK_FAR_TARGET: "pull",
 }
 # As supple_force and supple_motion.
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])
 _MOTION = np.dtype([("node", np.uint32), ("axes", np.uint32), ("metre", np.float32, 3), ("ramp", np.float32)])
 
 
+# In diagonals of the body: a length within which errors keep, and how far it moves in metres, as the kernel has it of targets.
+_MOST_TOLERANCE, _FAR = 0.1, 10.0
 # Radius of a patch of some 20 to 50 nodes, in mean edges.
 _PATCH = 2.2
 
@@ -423,6 +427,7 @@ class Simulation(library.Sealed):
                 raise InputError(f"targets: their shape is {array.shape}, it must be {wanted.points.shape}")
             wanted.targets = array
         self._set_pulls(groups)
+        self._warn_of("pulls: radius", radius, 1.0)
         outside = self.locate(wanted.points).distances
         if outside.max(initial=0.0) > 0.5 * radius:
             warnings.warn(
@@ -519,20 +524,27 @@ class Simulation(library.Sealed):
 
     @_one_at_a_time
     def remarks(self) -> list[str]:
-        """What looks as if a unit or a number was mistaken, in the kernel's words; the first step warns of it."""
-        found, count, room = ffi.new("supple_remark[]", 32), ffi.new("uint32_t *"), 32
-        points = library.pointer("float", self.scene.mesh.points)
-        status = lib.supple_remarks(self._raw_scene, points, self._loads, self._network, found, room, count)
-        library.checked(status, what="remarks")
+        """What looks as if a unit or a number was mistaken, in the kernel's words, the first of each kind; the first step warns of it."""
+        points, count, room = library.pointer("float", self.scene.mesh.points), ffi.new("uint32_t *", 32), 0
+        while count[0] > room:
+            room = count[0]
+            found = ffi.new("supple_remark[]", room)
+            status = lib.supple_remarks(self._raw_scene, points, self._loads, self._network, found, room, count)
+            library.checked(status, what="remarks")
         said = []
-        for remark in found[0 : min(count[0], room)]:
+        kinds = [remark.kind for remark in found[0 : count[0]]]
+        for remark in (found[kinds.index(kind)] for kind in dict.fromkeys(kinds)):
             figures = " against ".join(f"{value:.4g}" for value in (remark.value, remark.limit) if value != 0.0)
             place = f"{_PLACES[remark.kind]} {remark.index}: " if remark.kind in _PLACES else ""
             words = str(ffi.string(lib.supple_remark_text(remark.kind)), "ascii")
-            said.append(f"{place}{words} ({figures})" if figures else f"{place}{words}")
+            more = f", the first of {kinds.count(remark.kind)}" if kinds.count(remark.kind) > 1 else ""
+            said.append(f"{place}{words} ({figures}){more}" if figures else f"{place}{words}{more}")
         if not len(self.scene._supports) and not self._pull_groups:
             said.append("no node is fixed, moved or pulled: the body is free")
-        return said + self._loose_parts()
+        said += self._loose_parts()
+        if self._settings.tolerance > _MOST_TOLERANCE * self.scene._across:
+            said.append(f"tolerance {self._settings.tolerance:.4g} m {self._large()}")
+        return said
 
     def _loose_parts(self) -> list[str]:
         """Parts of the tissue that nothing holds, next to some that are held: meshes that were put together, and their nodes not."""
@@ -554,6 +566,15 @@ class Simulation(library.Sealed):
         points = self.scene.mesh.points
         near = [np.flatnonzero(np.linalg.norm(points - each, axis=1) < group.radius) for each in group.points]
         return np.concatenate(near) if near else np.zeros(0, np.intp)
+
+    def _large(self) -> str:
+        """Of a length that is."""
+        return f"is large for a body that is {self.scene._across:.3g} m across: is it in metres? (1 mm is 0.001 m)"
+
+    def _warn_of(self, what: str, metre: float, most: float) -> None:
+        """Where what is given now is longer than so many diagonals of the body."""
+        if metre > most * self.scene._across:
+            warnings.warn(f"{what} {metre:.4g} m {self._large()}", RuntimeWarning, stacklevel=4)
 
     def _warn_once(self) -> None:
         if self._is_warned:
@@ -646,6 +667,7 @@ class Simulation(library.Sealed):
         if not 0.0 < library.number(metre, "metre") < np.inf:
             raise InputError(f"settle to within {metre} m: it must be a positive number")
         self._warn_once()
+        self._warn_of("settle: to within", metre, _MOST_TOLERANCE)
         next_stage(self)
         room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
         pulls, told, steps = self._pull_memory, ffi.new("supple_settled *"), 0
@@ -671,6 +693,7 @@ class Simulation(library.Sealed):
         rows = library.vectors(metre, "displacements")
         if len(rows) != len(self.scene.mesh.points):
             raise InputError(f"displacements: {len(rows)} rows, there are {len(self.scene.mesh.points)} nodes")
+        self._warn_of("displacements: up to", float(np.linalg.norm(rows, axis=1).max(initial=0.0)), _FAR)
         error = library.new_error()
         given = library.pointer("float", rows)
         library.checked(lib.supple_set_displacements(self._raw_scene, self._state, given, len(rows), error), error, "displacements")

@@ -6,12 +6,14 @@ use serde::Deserialize;
 use supple::contact::{
     Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode, passes_between,
 };
+use supple::plausibility::of_distance;
 use supple::points::{FollowedPoint, VecPoints};
 use supple::scene::{Axes, Support};
 use toml::Spanned;
 
 use super::body::Body;
 use super::file::SceneFile;
+use super::plausible::late;
 use super::select::ON_PLANE;
 use crate::field::read_surface;
 use crate::problem::Problem;
@@ -113,6 +115,12 @@ impl SceneInstruments {
         let is_free = |node: u32| held[node as usize] != Axes::XYZ;
         let mut warnings = vec![];
         for (at, instrument) in file.scene.instrument.iter().zip(&self.all) {
+            let distances =
+                instrument.path.iter().map(|(time, _)| f64::from(instrument.at(*time).distance([0.0; 3], *time)));
+            let far = of_distance(distances.fold(f64::INFINITY, f64::min), body.diagonal());
+            let late = instrument.path.last().and_then(|(until, _)| late(file, "the path of this instrument", *until));
+            warnings
+                .extend(far.map(|remark| remark.to_string()).into_iter().chain(late).map(|it| file.problem(at, it).0));
             let placed = instrument.at(0.0);
             let depths =
                 self.nodes.iter().filter(|node| is_free(node.node)).map(|node| -placed.distance(node.rest, 0.0));

@@ -11,6 +11,36 @@ use super::file::SceneFile;
 use super::tissues::Tissues;
 use crate::problem::Problem;
 
+/// How many times as long as the simulation a ramp or a path may take: the beginning of one may be all that is asked for.
+const MOST_SPANS: f64 = 50.0;
+/// Share of the body's diagonal beyond which a length keeps no error small.
+const MOST_TOLERANCE: f64 = 0.1;
+
+/// A ramp or a path that the simulation sees little of.
+pub(crate) fn late(file: &SceneFile, what: &str, until: f64) -> Option<String> {
+    let end = *file.scene.time.get_ref().end.get_ref();
+    (until > MOST_SPANS * end)
+        .then(|| format!("{what} goes on to {until} s, and the simulation ends at {end} s (1 ms is 0.001 s)"))
+}
+
+/// Ramps that the simulation sees little of, and errors as large as the body: one of each kind.
+fn of_time(file: &SceneFile, body: &Body) -> Vec<Problem> {
+    let (scene, time, diagonal) = (&file.scene, file.scene.time.get_ref(), body.diagonal());
+    let forces = scene.force.iter().filter_map(|at| at.get_ref().ramp.as_ref());
+    let motions = scene.motion.iter().filter_map(|at| at.get_ref().ramp.as_ref());
+    let tractions = scene.traction.iter().filter_map(|at| at.get_ref().ramp.as_ref());
+    let pressures = scene.pressure.iter().filter_map(|at| at.get_ref().ramp.as_ref());
+    let mut ramps = forces.chain(motions).chain(tractions).chain(pressures);
+    let late = ramps.find_map(|at| Some(file.problem(at, late(file, "a ramp", f64::from(*at.get_ref()))?)));
+    let lengths = [("tolerance", &time.tolerance), ("settle", &time.settle)].into_iter();
+    let large = lengths.filter_map(|(name, at)| {
+        let (at, metre) = at.as_ref().map(|at| (at, *at.get_ref()))?;
+        let message = format!("{name} is {metre} m, the body is {diagonal:.3} m across (1 mm is 0.001 m)");
+        (f64::from(metre) > MOST_TOLERANCE * diagonal).then(|| file.problem(at, message))
+    });
+    late.into_iter().chain(large).collect()
+}
+
 /// What does not look right in the size of a mesh, and the remedy.
 pub(crate) fn size_remark(body: &Body) -> Option<String> {
     let remark = of_size(body.diagonal())?;
@@ -47,6 +77,7 @@ pub(crate) fn warnings(
     let of_supports = of_supports(elements, |node| held.get(node) == Some(&true));
     let of_others = of_gravity(gravity).into_iter().chain(of_supports).chain(proportions.of_forces(forces));
     let of_others = of_others.map(|remark| Problem::in_file(file.path(), remark));
+    let of_time = of_time(file, body);
     of_mesh
         .chain(of_tissues)
         .chain(of_others)

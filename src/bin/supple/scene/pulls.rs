@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use supple::element::Axes;
 use supple::material::VecMaterial;
-use supple::plausibility::of_pull;
+use supple::plausibility::{of_pull, of_target};
 use supple::points::VecPoints;
 use supple::pulls::{MOST_STIFFNESS, Pull, PulledNode, Pulls, corners, patch, usual_most};
 use supple::scene::{SceneView, Support};
@@ -12,6 +12,7 @@ use toml::Spanned;
 use super::body::Body;
 use super::file::SceneFile;
 use super::instruments::{checked_path, positive, short_part};
+use super::plausible::late;
 use super::points::is_outside;
 use super::select::select;
 use crate::problem::Problem;
@@ -125,8 +126,9 @@ impl ScenePulls {
         Ok(())
     }
 
-    /// Pulls that move nothing or are outside the mesh, with the place of their entry.
-    pub(crate) fn warnings(&self, file: &SceneFile, supports: &[Support]) -> Vec<String> {
+    /// Pulls that move nothing or are outside the mesh, and of those that go too far, take too long or are too wide for the body one of
+    /// each, with the place of their entry.
+    pub(crate) fn warnings(&self, file: &SceneFile, body: &Body, supports: &[Support]) -> Vec<String> {
         let held = |node: u32| {
             let own = supports.iter().filter(|support| support.node == node);
             own.fold(Axes::NONE, |axes, support| axes.union(support.axes))
@@ -145,6 +147,27 @@ impl ScenePulls {
             );
             remarks.push(file.problem(&at.get_ref().point, message).to_string());
         }
+        let diagonal = body.diagonal();
+        let mut paths =
+            file.scene.pull.iter().zip(&self.all).filter_map(|(at, pull)| Some((at.get_ref().path.as_ref()?, pull)));
+        let far = paths.clone().find_map(|(at, pull)| {
+            let way =
+                |to: &[f32; 3]| (0..3).map(|axis| f64::from(to[axis] - pull.at[axis]).powi(2)).sum::<f64>().sqrt();
+            let farthest = pull.path.iter().map(|(_, to)| way(to)).fold(0.0, f64::max);
+            Some(file.problem(at, of_target(farthest, diagonal)?).to_string())
+        });
+        let late = paths.find_map(|(at, pull)| {
+            Some(file.problem(at, late(file, "the path of a target", pull.path.last()?.0)?).to_string())
+        });
+        let mut radii = file.scene.pull.iter().filter_map(|at| at.get_ref().radius.as_ref());
+        let wide = radii.find(|at| f64::from(*at.get_ref()) > diagonal).map(|at| {
+            let message = format!(
+                "radius is {} m, the body is {diagonal:.3} m across: all of it is pulled (1 mm is 0.001 m)",
+                at.get_ref()
+            );
+            file.problem(at, message).to_string()
+        });
+        remarks.extend(far.into_iter().chain(late).chain(wide));
         remarks
     }
 

@@ -85,7 +85,7 @@ impl Setup {
         warnings.extend(time.old_name.clone());
         warnings.extend(instruments.warnings(file, &body, &supports)?);
         warnings.extend(points.warnings(file));
-        warnings.extend(pulls.warnings(file, &supports));
+        warnings.extend(pulls.warnings(file, &body, &supports));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
             if tissues.relax() {
