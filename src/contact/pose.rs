@@ -64,9 +64,4 @@ impl Placement {
     pub(super) fn turned(&self, direction: Vec3) -> Vec3 {
         self.rotation * direction
     }
-
-    /// Where the material point of the instrument that is at `point` now was, or will be, with the other placement.
-    pub(super) fn carried(&self, point: Vec3, other: &Self) -> Vec3 {
-        other.position + other.rotation * self.in_shape(point)
-    }
 }
