@@ -66,6 +66,7 @@ mod instrument;
 mod local_force;
 mod pose;
 mod pushes;
+mod rolling;
 mod shape;
 #[cfg(feature = "std")]
 mod signed_distance;

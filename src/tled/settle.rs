@@ -275,7 +275,7 @@ impl Bounds<'_> {
         state: StateView<'_>,
         with_pulls: bool,
     ) -> bool {
-        let StateView { displacement, increment, force, volume, progress, .. } = state;
+        let StateView { displacement, increment, force, volume, progress, pushes, .. } = state;
         let (rates, mut finite) = (&mut *self.rates, true);
         let vectors = [&mut *displacement, increment, force];
         let found = each_rate(scene, must_cast_slice(self.units), vectors, volume, |node, rate| {
@@ -286,6 +286,9 @@ impl Bounds<'_> {
         });
         if let Some(pressure) = loads.pressure() {
             pressure.add_stiffness(progress.time, displacement, rates);
+        }
+        if let Some(contact) = loads.contact() {
+            contact.add_stiffness(pushes, progress, displacement, rates);
         }
         if let Some(pulls) = loads.pulls().filter(|_| with_pulls) {
             for (_, pull) in pulls.acting() {
