@@ -12,6 +12,7 @@ use glam::Vec3;
 
 use super::instrument::MOST_INSTRUMENTS;
 use super::pushes::TouchedPoint;
+use super::surface::places;
 use super::{Placed, Surface, VECTORS_OF_TOUCHED};
 use crate::inertia::LOCAL_FLOATS;
 use crate::simd::{Kernel, NodeVector, Real, axes, dispatch};
@@ -58,7 +59,7 @@ const LOCAL_VECTORS: usize = LOCAL_FLOATS.div_ceil(4);
 /// ([`StateView::pushing`](crate::state::StateView::pushing)).
 #[must_use]
 pub const fn vectors_to_push(nodes: usize, triangles: usize) -> usize {
-    let places = nodes.saturating_add(triangles);
+    let places = places(nodes, triangles);
     places
         .saturating_mul(1 + VECTORS_OF_TOUCHED)
         .saturating_add(places.div_ceil(4) + VECTORS_OF_HEAD + LOCAL_VECTORS)

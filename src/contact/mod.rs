@@ -49,9 +49,9 @@
 //! of the step before. Learned steps refuse instruments: what they push would be inertia that is not there.
 //!
 //! An instrument that is thinner than edges are long meets triangles too ([`Surface::with_triangles`]): the push acts on the point of a
-//! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`, `src/step/triangles.rs`).
+//! triangle that is deepest inside, with capsules two, shared among its corners by the point's weights (`triangle.rs`, `src/step/triangles.rs`).
 //!
-//! Work: at most each node and triangle of the surface against each instrument in each step, and eight sweeps over the nodes and triangles that
+//! Work: at most each node and triangle of the surface against each instrument in each step, and 24 sweeps over the nodes and triangles that
 //! touch. A state with room for pushes
 //! ([`StateView::pushing`](crate::state::StateView::pushing)) knows how near each node was, and looks only at those that instruments can
 //! reach (`clearance.rs`). Nodes that supports hold along all axes are passed through. A node that touches several instruments is moved by
@@ -175,7 +175,7 @@ pub struct Touch {
     pub force: [f32; 3],
     /// Moment of the same about the position of the instrument at the end of the step, N m.
     pub moment: [f32; 3],
-    /// Nodes that it pushes, and triangles.
+    /// Nodes that it pushes, and points of triangles.
     pub contacts: u32,
     /// How far the deepest one would have been inside without the instrument, m.
     pub depth: f32,

@@ -75,14 +75,20 @@ impl<'a> Surface<'a> {
         self.triangles
     }
 
-    /// Its nodes and triangles: each node has a place, and after them each triangle.
+    /// Each node has a place, and after them each triangle two: those of its first points, then those of its second.
     pub(crate) const fn places(&self) -> usize {
-        self.nodes.len() + self.triangles.len()
+        places(self.nodes.len(), self.triangles.len())
+    }
+
+    /// Whether a place is that of the second point of a triangle.
+    pub(crate) const fn is_second(&self, place: usize) -> bool {
+        place >= self.nodes.len() + self.triangles.len()
     }
 
     /// The places of the corners of a triangle; of a node three times its own.
     pub(crate) fn corner_places(&self, place: usize) -> [usize; 3] {
-        let triangle = place.checked_sub(self.nodes.len()).and_then(|triangle| self.triangles.get(triangle));
+        let first = if self.is_second(place) { place - self.triangles.len() } else { place };
+        let triangle = first.checked_sub(self.nodes.len()).and_then(|triangle| self.triangles.get(triangle));
         triangle.map_or([place; 3], |corners| corners.map(|corner| corner as usize))
     }
 
@@ -91,6 +97,11 @@ impl<'a> Surface<'a> {
         let [a, b, c] = self.corner_places(place).map(|corner| self.nodes.get(corner).copied());
         Some([a?, b?, c?])
     }
+}
+
+/// Places of a surface of so many nodes and triangles.
+pub(super) const fn places(nodes: usize, triangles: usize) -> usize {
+    nodes.saturating_add(triangles.saturating_mul(2))
 }
 
 /// Whether an instrument of this [thickness](super::Shape::thickness), m, passes between the nodes of a surface, whose

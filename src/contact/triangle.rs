@@ -3,6 +3,11 @@
 //! centre, or to the ends of the axis, or on an edge. For fields by a pattern search in barycentric coordinates (Hooke
 //! & Jeeves 1961) with steps of 1/4 to 1/256 of an edge, at most 337 distances: it may miss a dent that is smaller than
 //! a triangle.
+//!
+//! A capsule that lies along a triangle is as deep over a length. A push at one point of it would turn the triangle until
+//! the other end is the deepest, and back: friction is lost, and nothing comes to rest. So a triangle has two points, which
+//! are the deepest of the capsule when it is turned by a small angle to either end: both ends of the length, until the
+//! triangle is tilted by more than this angle, when the one that jumps has long ceased to be pushed.
 
 use glam::Vec3;
 
@@ -10,8 +15,14 @@ use super::shape::Shape;
 use super::{Meeting, Placed};
 
 /// Parts of an edge that are told apart.
-const PARTS: i32 = 256;
-const FIRST_STEP: i32 = 64;
+const PARTS: i32 = 2048;
+const FIRST_STEP: i32 = 512;
+const LAST_STEP: i32 = 8;
+/// The tangent of the angle by which a capsule is turned, to either end, to find the two points of a triangle.
+const TURN: f32 = 0.03;
+/// A point that a capsule pushes stays where it is if it would move by no more parts: along the axis rounding alone would
+/// tell where it is.
+const PLAY: i32 = 2;
 /// Moves of a length before it is halved.
 const MOVES: usize = 4;
 
@@ -38,7 +49,7 @@ pub(crate) struct TrianglePoint([i32; 3]);
 impl TrianglePoint {
     /// The first corner. Of a place that is a node, the node.
     pub(crate) const CORNER: Self = Self([PARTS, 0, 0]);
-    const MIDDLE: Self = Self([86, 85, 85]);
+    const MIDDLE: Self = Self([PARTS - 2 * (PARTS / 3), PARTS / 3, PARTS / 3]);
 
     /// From the weights of the second and the third corner.
     pub(crate) fn from_weights(weights: [f32; 2]) -> Self {
@@ -61,6 +72,11 @@ impl TrianglePoint {
     pub(crate) fn mean(self, corners: [Vec3; 3]) -> Vec3 {
         let ([a, b, c], [x, y, z]) = (self.weights(), corners);
         a * x + b * y + c * z
+    }
+
+    /// Whether another point is as good.
+    pub(crate) fn is_near(self, other: Self) -> bool {
+        self.0.into_iter().zip(other.0).all(|(a, b)| (a - b).abs() <= PLAY)
     }
 
     pub(crate) fn is_corner(self) -> bool {
@@ -92,17 +108,27 @@ impl TrianglePoint {
 
 impl Placed<'_> {
     /// The point of a triangle that will be nearest to the instrument at the end of the step, and its meeting, from
-    /// where its corners will be, m. None if that is not a number.
-    pub(crate) fn meet_triangle(&self, corners: [Vec3; 3]) -> Option<(TrianglePoint, Meeting)> {
+    /// where its corners will be, m: of a capsule that is turned a little to one end, the second one to the other. None
+    /// if that is not a number.
+    pub(crate) fn meet_triangle(&self, corners: [Vec3; 3], second: bool) -> Option<(TrianglePoint, Meeting)> {
         let in_shape = corners.map(|corner| self.end.in_shape(corner));
         let point = match self.instrument.shape {
             Shape::Sphere { .. } => TrianglePoint::rounded(nearest_to_point(Vec3::ZERO, in_shape)),
             Shape::Capsule { length, .. } => {
-                TrianglePoint::rounded(nearest_to_segment([-0.5, 0.5].map(|end| end * length * Vec3::Z), in_shape))
+                let [a, b, c] = in_shape;
+                let turn = if second { -TURN } else { TURN };
+                let lowered = (b - a).cross(c - a).normalize_or_zero() * turn;
+                let ends = [-0.5, 0.5].map(|end| (Vec3::Z + lowered) * (end * length));
+                TrianglePoint::rounded(nearest_to_segment(ends, in_shape))
             }
             shape @ (Shape::Field(_) | Shape::Plane) => searched(|point| shape.nearest(point.mean(in_shape)).0),
         };
         Some((point, self.meet(point.mean(corners))?))
+    }
+
+    /// Whether triangles have a second point.
+    pub(crate) fn has_second_points(&self) -> bool {
+        matches!(self.instrument.shape, Shape::Capsule { .. })
     }
 
     /// Whether the point of a triangle is the nearest of all, and not only of those that were looked at.
@@ -115,7 +141,7 @@ impl Placed<'_> {
 fn searched(gap: impl Fn(TrianglePoint) -> f32) -> TrianglePoint {
     let mut best = (gap(TrianglePoint::MIDDLE), TrianglePoint::MIDDLE);
     let mut step = FIRST_STEP;
-    while step > 0 {
+    while step >= LAST_STEP {
         for _ in 0..MOVES {
             let mut next = best;
             for direction in DIRECTIONS {
@@ -270,7 +296,8 @@ mod tests {
                     least = least.min(gap([100 - b - c, b, c].map(|weight| weight as f32 / 100.0)));
                 }
             }
-            let (_, closed) = placed.meet_triangle(corners).expect("numbers");
+            let both = [false, true].map(|second| placed.meet_triangle(corners, second).expect("numbers").1);
+            let closed = if both[0].gap < both[1].gap { &both[0] } else { &both[1] };
             let search = gap(searched(|point| gap(point.weights())).weights());
             for (worst, found) in worst[case % 2].iter_mut().zip([closed.gap, search]) {
                 *worst = worst.max(found - least);
@@ -291,7 +318,7 @@ mod tests {
         for corners in [[at; 3], [at, 2.0 * at, 3.0 * at], [at, at, -at], [-at, at, at]] {
             for shape in [Shape::Sphere { radius: 0.001 }, Shape::Capsule { radius: 0.001, length: 0.01 }] {
                 let instrument = Instrument::resting(shape, Pose::at([0.0; 3]));
-                let (point, met) = Placed::new(&instrument, [0.0, 0.0]).meet_triangle(corners).expect("numbers");
+                let (point, met) = Placed::new(&instrument, [0.0, 0.0]).meet_triangle(corners, false).expect("numbers");
                 let least = corners.map(|corner| shape.nearest(corner).0).into_iter().fold(f32::INFINITY, f32::min);
                 assert!(met.gap <= least + 1e-6, "{point:?}, {} m, {least} m", met.gap);
             }

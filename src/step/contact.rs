@@ -361,6 +361,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             corners: [0, 1, 2].map(|corner| predicted(corners[corner].rest, &here[corner], next[corner])),
             next: next.map(axes),
             is_triangle: place >= surface.nodes().len(),
+            is_second: surface.is_second(place),
         }
     }
 

@@ -6,6 +6,7 @@ mod closed_forms;
 mod fields;
 mod grips;
 mod hand_speed;
+mod line;
 mod long_steps;
 mod scene;
 mod short_spans;

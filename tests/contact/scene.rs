@@ -8,8 +8,8 @@ use supple::material::{Element, NeoHookean, VecMaterial};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{Support, VecScene};
 use supple::state::{AsState, NodeVector, Progress, StateView};
-use supple::step::{Status, Step};
-use supple::tled;
+use supple::step::{CriticalStep, Status, Step};
+use supple::tled::{self, Settled, settle, vectors_to_settle};
 
 fn tissue() -> VecMaterial {
     VecMaterial::one(Element::NodalStrain, NeoHookean { c: 1000.0, d: 10_000.0 }, 1000.0)
@@ -24,6 +24,7 @@ pub(crate) struct Body {
     pub(crate) triangles: Vec<[u32; 3]>,
     every_triangle: Vec<[u32; 3]>,
     pub(crate) step: Step,
+    pub(crate) critical: CriticalStep,
     /// What the state keeps for instruments, if anything.
     pub(crate) pushes: Vec<NodeVector>,
     vectors: [Vec<NodeVector>; 5],
@@ -56,6 +57,7 @@ impl Body {
             triangles: Vec::new(),
             every_triangle,
             step,
+            critical,
             pushes: Vec::new(),
             vectors,
             progress,
@@ -101,6 +103,24 @@ impl Body {
         let mut state = state.feeling(touches).pushing(&mut self.pushes);
         let loads = Loads::new(&self.scene, gravity, &[], &[]).unwrap().touched_by(contact);
         tled::step(&self.scene, &loads, &mut state.as_state(), &self.step)
+    }
+
+    /// To rest under the instruments, in at most so many steps.
+    pub(crate) fn settle(&mut self, instruments: &[Instrument], metre: f32, most: u32) -> Settled {
+        let (surface, triangles) = (self.surface.clone(), self.triangles.clone());
+        let surface = Surface::new(&surface, self.points.len()).unwrap().with_triangles(&triangles).unwrap();
+        let contact = Contact::new(surface, instruments).unwrap();
+        let [displacement, remainder, increment, force, volume] = &mut self.vectors;
+        let state = StateView::new(displacement, remainder, increment, force, volume, &mut self.progress);
+        let mut state = state.pushing(&mut self.pushes);
+        let mut loads = Loads::NONE.touched_by(contact);
+        let mut storage = vec![NodeVector::ZERO; vectors_to_settle(self.points.len())];
+        settle(&self.scene, &mut loads, &mut state.as_state(), metre, most, &mut storage).unwrap()
+    }
+
+    /// J.
+    pub(crate) fn kinetic(&self) -> f64 {
+        self.progress.energy_balance().kinetic
     }
 
     /// Momentum of all nodes, kg m/s, and the mass, kg.
