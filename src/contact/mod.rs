@@ -96,6 +96,9 @@ use glam::Vec3;
 use crate::simd::NodeVector;
 use pose::Placement;
 
+/// How fast instruments put tissue out that was inside them, m/s.
+const OUTWARD: f32 = 0.25;
+
 /// Instruments and the surface that they can touch, checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact<'a> {
@@ -237,10 +240,16 @@ pub(crate) struct Meeting {
 }
 
 impl Meeting {
-    /// Where a point that moves so far (m) in the step will be from where it should be: the gap along the normal, the
-    /// slip across, m.
-    pub(crate) fn relative(&self, slip: Vec3) -> Vec3 {
-        self.gap * self.normal + (slip - slip.dot(self.normal) * self.normal)
+    /// Where a point that moves so far (m) over the instrument in a step of so many seconds will be from where it should
+    /// be: the gap along the normal, the slip across, m.
+    pub(crate) fn relative(&self, slip: Vec3, seconds: f32) -> Vec3 {
+        self.gap_to_close(slip, seconds) * self.normal + (slip - slip.dot(self.normal) * self.normal)
+    }
+
+    /// The gap (m) that a push closes: what was inside before the step, as tissue is that another instrument lets go,
+    /// goes out at a bounded speed, or short steps would throw it.
+    pub(crate) fn gap_to_close(&self, slip: Vec3, seconds: f32) -> f32 {
+        self.gap - (self.gap - slip.dot(self.normal) + OUTWARD * seconds).min(0.0)
     }
 
     /// How far a point that moves by `way` (m) comes nearer to the instrument in the step, m.

@@ -48,6 +48,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let limit = ContactMemory::split(pushes, &contact.surface())
             .map(|mut memory| memory.begin(progress, placed, farthest, 0.0));
         let mut touches = [Touch::default(); MOST_INSTRUMENTS];
+        let seconds = seconds_outward(step, method);
         let mut from = 0;
         while let Some(place) = self.next_in_reach(from, limit).filter(|&place| place < alone) {
             from = place + 1;
@@ -56,11 +57,12 @@ impl<M: ElementMaterial> Trial<'_, M> {
             for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
                 distance = distance.min(placed.least_distance(&met.meeting) - axes(met.next).length());
-                if met.meeting.gap < 0.0 && met.is_free() {
+                let gap = met.meeting.gap_to_close(axes(met.next) - met.meeting.carried, seconds);
+                if gap < 0.0 && met.meeting.gap < 0.0 && met.is_free() {
                     if self.refuses_depth((index, placed), entry.node, &met.meeting, axes(met.next)) {
                         return;
                     }
-                    let push = met.push(step, placed.instrument.friction);
+                    let push = met.push(step, gap, placed.instrument.friction);
                     pushes += push;
                     way += self.push(&met, push, (step, index, method), totals, touch);
                 }
@@ -285,7 +287,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                         self.touched = 0;
                         return;
                     }
-                    found.relative = meeting.relative(slip - meeting.carried).to_array();
+                    found.relative = meeting.relative(slip - meeting.carried, step.seconds()).to_array();
                     (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                     found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
                     found.instrument = index as u32;
@@ -532,8 +534,8 @@ impl Met {
         Vec3::from_array(self.inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 }))
     }
 
-    /// The push, N, along free axes.
-    fn push(&self, step: &Step, friction: f32) -> Vec3 {
+    /// The push that closes a gap (m), N, along free axes.
+    fn push(&self, step: &Step, gap: f32, friction: f32) -> Vec3 {
         let Self { inertia, next, meeting, .. } = self;
         let free = self.free();
         // A node that supports guide along a plane or a line is moved within it.
@@ -542,13 +544,18 @@ impl Met {
         if square < 1e-6 {
             return Vec3::ZERO;
         }
-        let out = -meeting.gap / square;
+        let out = -gap / square;
         let slip = free * (axes(*next) - meeting.carried);
         let slip = slip - normal * (slip.dot(normal) / square);
         let (length, most) = (slip.length(), friction * out * libm::sqrtf(square));
         let held = if length > most { most / length } else { 1.0 };
         (out * normal - held * slip) * (inertia.mass / step.push())
     }
+}
+
+/// The seconds in which tissue goes out of instruments: there is no time where it is only brought to rest.
+pub(super) fn seconds_outward<M: ElementMaterial, S: StepMethod<M>>(step: &Step, _: &S) -> f32 {
+    if S::IS_RELAXED { f32::INFINITY } else { step.seconds() }
 }
 
 pub(super) fn axes([x, y, z, _]: [f32; 4]) -> Vec3 {

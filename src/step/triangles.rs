@@ -12,7 +12,7 @@
 
 use glam::Vec3;
 
-use super::contact::{axes, predicted};
+use super::contact::{axes, predicted, seconds_outward};
 use super::{Step, StepMethod, Totals, Trial};
 use crate::contact::{
     Contact, ContactMemory, MOST_INSTRUMENTS, Meeting, Placed, Surface, Touch, TouchedPoint, TrianglePoint,
@@ -202,7 +202,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         (totals, touches): (&mut Totals, &mut [Touch; MOST_INSTRUMENTS]),
         limit: Option<f32>,
     ) {
-        let (surface, first) = (contact.surface(), self.touched);
+        let (surface, first, seconds) = (contact.surface(), self.touched, seconds_outward(step, method));
         let mut from = 0;
         while let Some(place) = self.next_in_reach(from, limit) {
             from = place + 1;
@@ -223,7 +223,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 if at.is_some_and(|at| self.refuses_depth(at, found.node(), &meeting, moved)) {
                     return;
                 }
-                found.vector = (meeting.relative(moved - meeting.carried) - moved).to_array();
+                found.vector = (meeting.relative(moved - meeting.carried, seconds) - moved).to_array();
                 (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                 found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
                 found.instrument = index as u32;

@@ -6,7 +6,7 @@ use supple::loads::Loads;
 use supple::mesh::Bar;
 use supple::scene::Support;
 use supple::state::NodeVector;
-use supple::step::{Cause, Status};
+use supple::step::{Cause, Status, Step};
 
 use super::scene::{Body, compared};
 use crate::networks::uniform;
@@ -64,6 +64,24 @@ fn tissue_is_free_when_the_instrument_leaves() {
     assert!(pressed > 2e-3 && most > 1e-3);
     assert_eq!(touch[0], Touch::default());
     assert!(left.abs() < 0.01 * pressed);
+}
+
+/// Tissue that is inside an instrument goes out as fast in short steps as in long ones.
+#[test]
+fn tissue_inside_an_instrument_is_not_thrown() {
+    let sphere = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([-0.0085, 0.0066, 0.0267]));
+    for share in [1.0, 0.1] {
+        let mut body = Body::new(BAR, &fixed_end(), 20.0);
+        body.step = Step::unchecked(share * body.step.seconds(), 20.0).unwrap();
+        let mut most = 0.0f64;
+        while body.time() < 0.03 {
+            assert!(body.step([0.0; 3], &[sphere], &mut [Touch::default()]).is_taken());
+            most = most.max(body.kinetic());
+        }
+        let out = body.displacement(BAR.node(0, 1, 4) as usize)[0];
+        println!("{share} times the usual step: up to {most:.1e} J, {:.2} mm out", 1e3 * out);
+        assert!(most < 3e-5 && out > 1.4e-3, "{most} J, {out} m");
+    }
 }
 
 /// An instrument that touches nothing changes no bit.
