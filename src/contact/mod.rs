@@ -278,6 +278,12 @@ impl<'a> Placed<'a> {
         self.start.position.distance(self.end.position)
     }
 
+    /// Whether a box (m) is nowhere near its way in the step.
+    pub(crate) fn passes_by(&self, [least, most]: [Vec3; 2]) -> bool {
+        let ([from, to], extent) = ([&self.start, &self.end].map(|at| at.position), self.instrument.shape.extent());
+        (from.max(to) + extent).cmplt(least).any() || (from.min(to) - extent).cmpgt(most).any()
+    }
+
     /// The farthest that it and the tissue may come nearer to each other in a step, m: farther, and tissue could be on
     /// its other side.
     pub(crate) fn thickness(&self) -> f32 {

@@ -433,15 +433,31 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    /// Refuses the step if an instrument moves too far in it.
+    /// Refuses the step if an instrument moves too far in it, near the tissue.
     fn refuses_speed(&mut self, contact: &Contact<'_>, placed: &[Placed<'_>]) -> bool {
         for (index, placed) in placed.iter().enumerate() {
-            let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
-            if self.refuses(index, node, [placed.way(), placed.thickness()]) {
-                return true;
+            let metres = [placed.way(), placed.thickness()];
+            // Few are so fast that the tissue is looked at.
+            if metres[0] > metres[1] && !placed.passes_by(self.bounds_of_surface(contact)) {
+                let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
+                return self.refuses(index, node, metres);
             }
         }
         false
+    }
+
+    /// The box around the surface now, and where it goes to, m.
+    fn bounds_of_surface(&self, contact: &Contact<'_>) -> [Vec3; 2] {
+        let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        for entry in contact.surface().nodes() {
+            let row = |vectors: &[NodeVector]| vectors.get(entry.node as usize).copied().unwrap_or_default();
+            let (displacement, increment) = (row(self.displacement), row(self.increment));
+            for times in [0.0, NEAR] {
+                let point = predicted(entry.rest, &displacement, increment.0.map(|component| times * component));
+                bounds = [bounds[0].min(point), bounds[1].max(point)];
+            }
+        }
+        bounds
     }
 
     /// Refuses the step if a point that moves by `way` (m) was so far inside an instrument before it that it would be

@@ -104,6 +104,11 @@ fn what_is_too_fast_or_inside_the_body_is_refused_with_its_name() {
     fast.move_to(Pose::at([0.025, 0.01, 0.03]), 0.0, f64::from(body.step.seconds()));
     let inside = Instrument::resting(Shape::Sphere { radius: 0.015 }, Pose::at([0.01, 0.01, 0.03]));
     let table = Instrument::resting(Shape::Plane, Pose::at([0.0, 0.0, -1.0]));
+    // As fast as the first one, but nowhere near.
+    let mut above = Instrument::resting(Shape::Sphere { radius: 0.002 }, Pose::at([-0.005, 0.01, 0.06]));
+    above.move_to(Pose::at([0.025, 0.01, 0.06]), 0.0, f64::from(body.step.seconds()));
+    let mut other = Body::new(BAR, &fixed_end(), 5.0);
+    assert_eq!(other.step([0.0; 3], &[table, above], &mut [Touch::default(); 2]), Status::Ok);
     for (wrong, what) in [(fast, "fast"), (inside, "inside")] {
         let before = body.bits();
         let status = body.step([0.0; 3], &[table, wrong], &mut [Touch::default(); 2]);
