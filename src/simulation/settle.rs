@@ -9,6 +9,9 @@ use crate::simd::NodeVector;
 use crate::step::{CallingThread, Status, Threads};
 use crate::tled::{self, Settled, settle_in_parts, vectors_to_settle};
 
+/// Steps after which points of pulls turn with a body that comes to rest.
+const FIRST_STEPS: u32 = 64;
+
 impl Simulation<'_> {
     /// Brings the body to rest under its loads and instruments ([`tled::settle`]): every node to within about `metre` (m)
     /// of where it rests, in at most so many steps, each about as long as an exact one. Loads act as at the present
@@ -31,20 +34,22 @@ impl Simulation<'_> {
         self.acting()?;
         self.turn_pulls();
         let mut room = vec![NodeVector::ZERO; vectors_to_settle(self.scene().node_count())];
-        let mut steps = 0;
+        // Pulls turn with the body when it is nearly at rest, before it is brought on.
+        let (mut steps, mut most) = (0, if self.pulls.is_empty() { most_steps } else { FIRST_STEPS.min(most_steps) });
         loop {
             let Acting { mut loads, scene, state, .. } = self.acting()?;
-            let left = most_steps.saturating_sub(steps);
-            let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, left, &mut room, threads)?;
+            let settled = settle_in_parts(scene.view(), &mut loads, state.view(), metre, most, &mut room, threads)?;
             if let Status::Diverged(divergence) = settled.status {
                 return Err(SimulationError::Refused(divergence));
             }
             steps += settled.steps;
             // Where it rests its pulls have turned it, and turn with it.
-            let has_turned = settled.at_rest && self.turn_pulls() > metre;
-            if !has_turned || steps >= most_steps {
-                return Ok(Settled { at_rest: settled.at_rest && !has_turned, steps, ..settled });
+            let has_turned = !self.pulls.is_empty() && self.turn_pulls() > metre;
+            let at_rest = settled.at_rest && !has_turned;
+            if at_rest || steps >= most_steps || settled.steps == 0 {
+                return Ok(Settled { at_rest, steps, ..settled });
             }
+            most = most_steps - steps;
         }
     }
 

@@ -87,5 +87,5 @@ fn same_steps(mut all: Body, mut few: Body, forget: impl Fn(&mut Body, &mut Vec<
         assert_eq!(all.bits(), few.bits(), "round {round}");
     }
     println!("{touched} touches, {refused} steps refused");
-    assert!(touched > rounds && refused > 3);
+    assert!(touched > rounds / 2 && refused > 3);
 }

@@ -390,7 +390,7 @@ fn a_call_ends_when_its_work_is_spent() {
 fn a_call_without_a_step_tells_what_is_known_of_the_state() {
     let body = small_bar();
     let critical = Parts::of(&body).critical.seconds;
-    for method in [Method::Long(long()), Method::Auto(long())] {
+    for (method, doubts) in [(Method::Long(long()), 1..30), (Method::Auto(long()), 0..30)] {
         let step = matches!(method, Method::Long(_)).then_some(20.0 * critical);
         let settings = Settings { method, step, tolerance: Some(1e-5), damping: DAMPING, ..Settings::default() };
         let mut simulation = twisted(&body, settings);
@@ -402,7 +402,7 @@ fn a_call_without_a_step_tells_what_is_known_of_the_state() {
             doubted += usize::from(!short.is_ok());
         }
         println!("{doubted} of 30 calls without a step are doubted");
-        assert!((1..30).contains(&doubted));
+        assert!(doubts.contains(&doubted));
     }
 }
 

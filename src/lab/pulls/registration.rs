@@ -294,8 +294,7 @@ pub fn start(lobe: &Lobe, truth: &Truth, points: usize, seed: u64) -> Result<Sta
     let (settled, time, shape) = settle(METRE, 20_000)?;
     let mut within = 0;
     for steps in (LOOK..=settled.steps).step_by(LOOK as usize) {
-        // So near that it takes all of these steps.
-        if far(&settle(1e-9, steps)?.2) > METRE {
+        if far(&settle(METRE, steps)?.2) > METRE {
             within = steps + LOOK;
         }
     }

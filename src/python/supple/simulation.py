@@ -673,17 +673,19 @@ class Simulation(library.Sealed):
         pulls, told, steps = self._pull_memory, ffi.new("supple_settled *"), 0
         if pulls:
             pulls.turn(self)
+        # They turn with the body when it is nearly at rest, before it is brought on.
+        most = min(64, most_steps) if pulls else most_steps
         while True:
-            left = max(1, most_steps - steps)
-            status = lib.supple_sim_settle(self._sim, metre, left, self._threads, room.pointer, room.size, told)
+            status = lib.supple_sim_settle(self._sim, metre, most, self._threads, room.pointer, room.size, told)
             library.checked(status, told.error, "settle")
             steps += int(told.steps)
-            behind = status == lib.SUPPLE_BEHIND
             # Where it rests its pulls have turned it, and turn with it.
-            has_turned = bool(pulls) and not behind and pulls.turn(self) > metre
-            if not has_turned or steps >= most_steps:
+            has_turned = pulls is not None and pulls.turn(self) > metre
+            is_over = status != lib.SUPPLE_BEHIND and not has_turned
+            if is_over or steps >= most_steps or told.steps == 0:
                 break
-        word = "behind" if has_turned else _WORDS.get(status, str(status))
+            most = most_steps - steps
+        word = _WORDS.get(status, str(status)) if is_over else "behind"
         return Settled(word != "behind", float(told.remaining), steps, word)
 
     @_one_at_a_time
