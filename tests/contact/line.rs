@@ -13,7 +13,7 @@ const RADIUS: f32 = 0.015;
 /// On a slab that stands on its bottom.
 fn slab(bar: Bar, damping: f32) -> Body {
     let bottom = (0..=bar.cells[1]).flat_map(|j| (0..=bar.cells[0]).map(move |i| bar.node(i, j, 0)));
-    Body::new(bar, &bottom.map(|node| Support::fixed(node as u32)).collect::<Vec<_>>(), damping).with_triangles()
+    Body::new(bar, &bottom.map(Support::fixed).collect::<Vec<_>>(), damping).with_triangles()
 }
 
 /// Lies along x, so far above the slab (m) and moved by so much sideways.
