@@ -107,7 +107,7 @@ fn every_way_to_rest_leads_to_the_same_place() {
             let critical = simulation.critical_step().unwrap().seconds;
             let step = multiple.map(|multiple| multiple * critical);
             simulation.set(Settings { method, step, damping: 20.0, ..Settings::default() });
-            for _ in 0..120 {
+            for _ in 0..150 {
                 let report = simulation.advance(1.0 / 30.0).unwrap();
                 assert!(report.status.is_taken(), "{element:?}: {:?}", report.status);
             }
@@ -126,7 +126,7 @@ fn every_way_to_rest_leads_to_the_same_place() {
             let long = rest(Method::Long(method), Some(multiple), Some(all()));
             let off = apart(&exact, &long) / way;
             println!("{element:?}: {off:.1e} off after {multiple} times the critical step");
-            assert!(off < 1e-3);
+            assert!(off < 5e-4);
         }
     }
 }
