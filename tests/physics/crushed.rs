@@ -79,19 +79,7 @@ fn soft_organs_hang_without_elements_inside_out() {
 
 #[cfg(feature = "slow-tests")]
 #[test]
-fn the_softest_organs_hang_without_elements_inside_out() {
-    hang_all(&[2_000.0], &[0.49]);
-}
-
-/// Takes ten seconds.
-#[test]
-#[ignore = "the softest ones are those that crush most"]
 fn seventy_two_organs_hang_without_elements_inside_out() {
-    hang_all(&[2_000.0, 3_000.0, 5_000.0, 10_000.0], &[0.45, 0.49]);
-}
-
-/// Bodies of so many Pa and these ratios of Poisson's, under gravity from three sides.
-fn hang_all(young: &[f64], nu: &[f64]) {
     let bodies =
         [("lobe", Body::lobe()), ("liver", Body::bar([0.12, 0.15, 0.08], [8, 10, 6])), ("cylinder", Body::cylinder())];
     let mut least_of_all = f32::INFINITY;
@@ -101,12 +89,14 @@ fn hang_all(young: &[f64], nu: &[f64]) {
             "liver" => y < 1e-6,
             _ => z < 1e-6,
         });
-        for (&young, &nu) in young.iter().flat_map(|young| nu.iter().map(move |nu| (young, nu))) {
-            for gravity in [DOWN, [0.0, -9.81, 0.0], [0.0, 9.81, 0.0]] {
-                let (least, far) = hang(body, &supports, neo_hookean(young, nu), gravity, 0.6);
-                println!("{name}, E {young}, nu {nu}, {gravity:?}: least {least:.3}, farthest {:.1} mm", 1e3 * far);
-                least_of_all = least_of_all.min(least);
-                assert!(least > 0.1 && far > 0.005);
+        for young in [2_000.0, 3_000.0, 5_000.0, 10_000.0] {
+            for nu in [0.45, 0.49] {
+                for gravity in [DOWN, [0.0, -9.81, 0.0], [0.0, 9.81, 0.0]] {
+                    let (least, far) = hang(body, &supports, neo_hookean(young, nu), gravity, 0.6);
+                    println!("{name}, E {young}, nu {nu}, {gravity:?}: least {least:.3}, farthest {:.1} mm", 1e3 * far);
+                    least_of_all = least_of_all.min(least);
+                    assert!(least > 0.1 && far > 0.005);
+                }
             }
         }
     }
