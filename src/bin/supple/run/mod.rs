@@ -88,7 +88,7 @@ impl<'a> Running<'a> {
     pub(crate) fn begin(setup: &'a Setup, start: Start<'a>, tick: &'a dyn Fn(f64)) -> Result<Self, Problem> {
         let Start { at_rest, step, simulation } = start;
         let mut outcome = Outcome::new(at_rest, step.seconds());
-        outcome.points = FollowedPoints::new(&setup.points);
+        outcome.points = FollowedPoints::new(&setup.points, simulation.scene().node_count())?;
         outcome.reactions = Reactions::new(setup.instruments.all.len(), &setup.time);
         outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
         outcome.learned = simulation.learned_step().map(LearnedTrace::new);
@@ -101,8 +101,6 @@ impl<'a> Running<'a> {
         let limits = setup.pulls.limit(simulation.scene().view());
         let mut running = Self { setup, simulation, loads, limits, outcome, tick, taken: 0 };
         if let Some(metre) = setup.time.settle {
-            // Points are followed from rest.
-            running.outcome.points.enter(running.simulation.state())?;
             running.settle(metre)?;
         }
         Ok(running)
