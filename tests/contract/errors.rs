@@ -2,12 +2,14 @@
 //! empty and the state where it was.
 
 use supple::loads::{LoadError, Loads, Motion, NodalForce, traction};
-use supple::material::{AnyLaw, Exponential, Material, NeoHookean, NodalStrain, Regions, Tissue};
+use supple::material::{AnyLaw, Exponential, Material, NeoHookean, NodalStrain, Regions, Tissue, VecMaterial};
 use supple::mesh::{Mesh, MeshError, Winding};
 use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for};
 use supple::state::FixedState;
 use supple::step::{Status, Step, StepError};
 use supple::tled;
+
+use crate::support::at_run_time;
 
 const POINTS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01], [0.01, 0.01, 0.01]];
@@ -15,14 +17,18 @@ const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
 const TISSUE: Tissue<AnyLaw> =
     Tissue { law: AnyLaw::NeoHookean(NeoHookean { c: 500.0, d: 25_000.0 }), density: 1000.0 };
 
-type SmallScene = FixedScene<Tissue<AnyLaw>, 5, 1>;
+type SmallScene = FixedScene<VecMaterial, 5, 1>;
 
 fn good() -> Mesh<'static> {
     Mesh::new(&POINTS, &TETS, Winding::Checked).unwrap()
 }
 
+fn of<M: Material<Law: Into<AnyLaw>>>(material: &M) -> SmallScene {
+    SmallScene::new(at_run_time(material))
+}
+
 fn built() -> SmallScene {
-    let mut scene = SmallScene::new(TISSUE);
+    let mut scene = of(&TISSUE);
     let supports = [Support::fixed(0), Support { node: 1, axes: Axes::X, moves: true }];
     scene.build(&good(), &supports).unwrap();
     scene
@@ -93,7 +99,7 @@ fn mesh_errors_say_what_is_wrong_and_where() {
 }
 
 /// The error of a build, whose scene was full before.
-fn refused<M: Material>(mut scene: FixedScene<M, 5, 1>, mesh: &Mesh<'_>, supports: &[Support]) -> BuildError {
+fn refused(mut scene: SmallScene, mesh: &Mesh<'_>, supports: &[Support]) -> BuildError {
     let error = scene.build(mesh, supports).unwrap_err();
     assert_eq!((scene.node_count(), scene.element_count()), (0, 0), "{error}");
     assert_eq!(scene.mass(), 0.0);
@@ -133,7 +139,7 @@ fn build_errors_say_what_is_wrong_and_leave_the_scene_empty() {
         ),
         (
             refused(
-                FixedScene::new(Regions { law: TISSUE.law, tissues: &[TISSUE.values()], of_element: &[0, 1] }),
+                of(&Regions { law: TISSUE.law, tissues: &[TISSUE.values(); 2], of_element: &[0, 2] }),
                 &good(),
                 &[],
             ),
@@ -145,14 +151,14 @@ fn build_errors_say_what_is_wrong_and_leave_the_scene_empty() {
         assert_eq!(error, expected);
         assert_eq!(error.to_string(), text);
     }
-    let strain = refused(FixedScene::new(NodalStrain(TISSUE)), &good(), &[]);
+    let strain = refused(of(&NodalStrain(TISSUE)), &good(), &[]);
     let needed = patch_rows_for(5, 2, 1);
     assert_eq!(strain, BuildError::PatchCapacity { needed, capacity: 0 });
     let text = format!("{needed} rows of patches are enough for nodal strain, the scene has room for 0");
     assert_eq!(strain.to_string(), text);
-    let (tissues, of_element) = ([TISSUE.values()], [0]);
+    let (tissues, of_element) = ([TISSUE.values(); 2], [0]);
     let short = Regions { law: TISSUE.law, tissues: &tissues, of_element: &of_element };
-    assert_eq!(refused(FixedScene::new(short), &good(), &[]), BuildError::NoTissue { element: 1 });
+    assert_eq!(refused(of(&short), &good(), &[]), BuildError::NoTissue { element: 1 });
     let all = [0, 1, 2, 3, 4].map(Support::moved);
     assert_eq!(built().build(&good(), &all), Ok(()), "what is moved by the host may move");
 }
@@ -163,11 +169,11 @@ fn constants_that_are_not_finite_and_positive_are_refused_by_name() {
         let soft = |c, d| Tissue { law: NeoHookean { c, d }, density: 1000.0 };
         let stiff = |a, b, d| Tissue { law: Exponential { a, b, d }, density: 1000.0 };
         let refusals = [
-            ("c", refused(FixedScene::new(soft(value, 1.0)), &good(), &[])),
-            ("d", refused(FixedScene::new(soft(1.0, value)), &good(), &[])),
-            ("a", refused(FixedScene::new(stiff(value, 1.0, 1.0)), &good(), &[])),
-            ("b", refused(FixedScene::new(stiff(1.0, value, 1.0)), &good(), &[])),
-            ("d", refused(FixedScene::new(stiff(1.0, 1.0, value)), &good(), &[])),
+            ("c", refused(of(&soft(value, 1.0)), &good(), &[])),
+            ("d", refused(of(&soft(1.0, value)), &good(), &[])),
+            ("a", refused(of(&stiff(value, 1.0, 1.0)), &good(), &[])),
+            ("b", refused(of(&stiff(1.0, value, 1.0)), &good(), &[])),
+            ("d", refused(of(&stiff(1.0, 1.0, value)), &good(), &[])),
         ];
         for (name, error) in refusals {
             assert_eq!(
@@ -179,7 +185,7 @@ fn constants_that_are_not_finite_and_positive_are_refused_by_name() {
         let tissues = [TISSUE, heavy].map(|tissue| tissue.values());
         let regions = Regions { law: TISSUE.law, tissues: &tissues, of_element: &[0, 1] };
         assert_eq!(
-            refused(FixedScene::new(regions), &good(), &[]).to_string(),
+            refused(of(&regions), &good(), &[]).to_string(),
             format!("element 1: density is {value} kg/m^3, it must be a finite positive number")
         );
     }
@@ -266,7 +272,7 @@ fn a_state_or_loads_of_another_scene_move_nothing() {
     let mut small = FixedState::<4>::new();
     assert_eq!(tled::step(&scene, &Loads::NONE, &mut small, &step), Status::Mismatch { nodes: 5, room: 4 });
     let (points, tets) = (&POINTS[..4], &TETS[..1]);
-    let mut other = SmallScene::new(TISSUE);
+    let mut other = of(&TISSUE);
     other.build(&Mesh::new(points, tets, Winding::Checked).unwrap(), &[]).unwrap();
     let foreign = Loads::new(&other, [0.0, 0.0, -9.81], &[], &[]).unwrap();
     let mut state = FixedState::<5>::new();
@@ -277,7 +283,7 @@ fn a_state_or_loads_of_another_scene_move_nothing() {
 
 #[test]
 fn an_empty_scene_steps_without_harm() {
-    let scene = SmallScene::new(TISSUE);
+    let scene = of(&TISSUE);
     let mut state = FixedState::<5>::new();
     let step = Step::unchecked(1e-5, 0.0).unwrap();
     // Nothing is there to move; no panic is what matters.

@@ -4,14 +4,14 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
 use supple::image::{FieldKind, ImageGrid, displacement_field, scratch_for};
 use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{AnyLaw, Element, Exponential, NeoHookean, NodalStrain, Tissue};
+use supple::material::{Element, Exponential, VecMaterial};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::points::{FollowedPoint, follow, locate, words_for};
@@ -21,6 +21,8 @@ use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for, tiles
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
 use supple::tled;
+
+use crate::support::{DENSITY, EXP};
 
 /// Counts the allocations of each thread; the test harness allocates on others.
 struct Counting;
@@ -58,10 +60,14 @@ const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
 const NODES: usize = BAR.node_count();
 const TETS: usize = BAR.element_count();
 const TILES: usize = tiles_for(TETS);
-const TISSUE: Tissue<AnyLaw> =
-    Tissue { law: AnyLaw::Exponential(Exponential { a: 59.0, b: 8.023, d: 60_000.0 }), density: 1000.0 };
 
-static SCENE: Mutex<FixedScene<Tissue<AnyLaw>, NODES, TILES>> = Mutex::new(FixedScene::new(TISSUE));
+/// Made beforehand: its tables are on the heap.
+fn material(element: Element) -> VecMaterial {
+    VecMaterial::one(element, EXP, DENSITY)
+}
+
+static SCENE: LazyLock<Mutex<FixedScene<VecMaterial, NODES, TILES>>> =
+    LazyLock::new(|| Mutex::new(FixedScene::new(material(Element::Linear))));
 static STATE: Mutex<FixedState<NODES>> = Mutex::new(FixedState::new());
 
 /// Points and elements in arrays.
@@ -99,7 +105,12 @@ fn the_allocator_counts() {
 #[test]
 fn an_exchange_allocates_nothing() {
     let (points, tets) = mesh();
-    let (mut scene, mut state) = (FixedScene::<_, NODES, TILES>::new(TISSUE), FixedState::<NODES>::new());
+    let (mut scene, mut state) =
+        (FixedScene::<_, NODES, TILES>::new(material(Element::Linear)), FixedState::<NODES>::new());
+    let mut stiffer = [60.0, 62.0].map(|a| {
+        let law = Exponential { a, b: 8.023, d: 60_000.0 };
+        Some(VecMaterial::one(Element::Linear, law, DENSITY))
+    });
     let before = allocations();
     let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
     scene.build(&mesh, &supports()).unwrap();
@@ -109,8 +120,7 @@ fn an_exchange_allocates_nothing() {
         match stage {
             0 => {}
             1 | 3 => {
-                let law = AnyLaw::Exponential(Exponential { a: 59.0 + stage as f32, b: 8.023, d: 60_000.0 });
-                assert!(scene.set_constants(Tissue { law, ..TISSUE }).unwrap());
+                assert!(scene.set_constants(stiffer[stage / 2].take().unwrap()).unwrap());
                 assert!(tled::carry_on(&scene, &mut state));
             }
             _ => {
@@ -219,8 +229,8 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 }
 
 const ROWS: usize = patch_rows_for(NODES, TETS, 1);
-static PATCHES: Mutex<FixedScene<NodalStrain<Tissue<AnyLaw>>, NODES, TILES, ROWS>> =
-    Mutex::new(FixedScene::new(NodalStrain(TISSUE)));
+static PATCHES: LazyLock<Mutex<FixedScene<VecMaterial, NODES, TILES, ROWS>>> =
+    LazyLock::new(|| Mutex::new(FixedScene::new(material(Element::NodalStrain))));
 
 #[test]
 fn nodal_strain_in_a_static_allocates_nothing() {
@@ -257,7 +267,7 @@ static LARGE: Mutex<[NodeVector; VECTORS]> = Mutex::new([NodeVector::ZERO; VECTO
 fn steps_beyond_the_limit_in_statics_allocate_nothing() {
     let (points, tets) = mesh();
     let mut storage = LARGE.lock().unwrap();
-    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut scene = FixedScene::<_, NODES, TILES>::new(material(Element::Linear));
     let mut state = FixedState::<NODES>::new();
     let before = allocations();
 
@@ -300,7 +310,7 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
 fn a_long_roll_out_in_statics_allocates_nothing() {
     let (points, tets) = mesh();
     let mut storage = LARGE.lock().unwrap();
-    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut scene = FixedScene::<_, NODES, TILES>::new(material(Element::Linear));
     let mut state = FixedState::<NODES>::new();
     let before = allocations();
 
@@ -346,7 +356,7 @@ fn a_learned_roll_out_in_statics_allocates_nothing() {
 fn learned_roll_out(weights: &[u8], fallback: bool) {
     let (points, tets) = mesh();
     let mut storage = LEARNED.lock().unwrap();
-    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut scene = FixedScene::<_, NODES, TILES>::new(material(Element::Linear));
     let mut state = FixedState::<NODES>::new();
     let before = allocations();
 
@@ -401,17 +411,16 @@ fn a_forward_pass_allocates_nothing() {
 fn too_few_nodes_or_tiles_is_an_error_and_leaves_the_scene_empty() {
     let (points, tets) = mesh();
     let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
-    let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
-    let mut scene = FixedScene::<_, { NODES - 1 }, TILES>::new(tissue);
+    let mut scene = FixedScene::<_, { NODES - 1 }, TILES>::new(material(Element::Linear));
     assert_eq!(scene.build(&mesh, &[]), Err(BuildError::NodeCapacity { needed: NODES, capacity: NODES - 1 }));
     assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
 
-    let mut scene = FixedScene::<_, NODES, { TILES - 1 }>::new(tissue);
+    let mut scene = FixedScene::<_, NODES, { TILES - 1 }>::new(material(Element::Linear));
     assert_eq!(scene.build(&mesh, &[]), Err(BuildError::TileCapacity { needed: TILES, capacity: TILES - 1 }));
     assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
 
     // More room than needed does no harm.
-    let mut scene = FixedScene::<_, { NODES + 5 }, { TILES + 2 }>::new(tissue);
+    let mut scene = FixedScene::<_, { NODES + 5 }, { TILES + 2 }>::new(material(Element::Linear));
     assert_eq!(scene.build(&mesh, &[]), Ok(()));
     assert_eq!((scene.node_count(), scene.element_count()), (NODES, TETS));
 

@@ -1,8 +1,6 @@
 //! A step in parts, wherever and in whatever order they run, gives the bits of the step in one; and the parts compute
 //! the forces of every element once.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
@@ -16,39 +14,17 @@ use supple::tled;
 
 use crate::networks::{Memory, described, uniform};
 use crate::support::bodies::{corner_torsion, held};
-use crate::support::{Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened};
+use crate::support::{Backwards, Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened};
 use crate::{reference, support};
 
 const DT: f32 = 2e-5;
-
-/// Each part on a thread of its own, the last one first; counts them.
-pub(crate) struct Backwards {
-    pub(crate) parts: usize,
-    pub(crate) most: AtomicUsize,
-}
-
-impl Threads for Backwards {
-    fn parts(&self) -> usize {
-        self.parts
-    }
-
-    fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync) {
-        self.most.fetch_max(parts.len(), Ordering::Relaxed);
-        let work = &work;
-        std::thread::scope(|scope| {
-            for part in parts.iter_mut().rev() {
-                scope.spawn(move || work(part));
-            }
-        });
-    }
-}
 
 /// Thirty steps (s) of a scene under gravity give the same bits by every number of parts.
 pub(crate) fn same_bits_in_parts<M: ElementMaterial>(scene: &VecScene<M>, seconds: f32) {
     let loads = Loads::new(scene, [0.0, -9.81, 0.0], &[], &[]).unwrap();
     let step = Step::unchecked(seconds, 20.0).unwrap();
     let of = |parts: usize| {
-        let threads = Backwards { parts, most: AtomicUsize::new(0) };
+        let threads = Backwards::new(parts);
         let mut state = VecState::of(scene.view());
         for _ in 0..30 {
             taken(tled::step_in_parts(scene.view(), &loads, state.view(), &step, &threads));
@@ -183,7 +159,7 @@ fn large(body: &Body, threads: &impl Threads) -> Vec<u64> {
 #[test]
 fn any_number_of_parts_gives_the_same_bits_of_large_steps() {
     for (name, body) in [("in order", body()), ("shuffled", shuffled())] {
-        let of = |parts| large(&body, &Backwards { parts, most: AtomicUsize::new(0) });
+        let of = |parts| large(&body, &Backwards::new(parts));
         let one = of(1);
         for parts in [2, 3, 5, 8] {
             assert!(of(parts) == one, "{name}: {parts} parts of a long step");
@@ -194,10 +170,10 @@ fn any_number_of_parts_gives_the_same_bits_of_large_steps() {
 #[test]
 fn any_number_of_parts_gives_the_same_bits() {
     for (name, body) in [("in order", body()), ("shuffled", shuffled())] {
-        let one = Backwards { parts: 1, most: AtomicUsize::new(0) };
+        let one = Backwards::new(1);
         let (exact_bits, learned_bits) = (exact(&body, &one), learned(&body, &one));
         for parts in [2, 3, 5, 8, 100] {
-            let threads = Backwards { parts, most: AtomicUsize::new(0) };
+            let threads = Backwards::new(parts);
             assert!(exact(&body, &threads) == exact_bits, "{name}: {parts} parts of an exact step");
             assert!(learned(&body, &threads) == learned_bits, "{name}: {parts} parts of a learned step");
             assert_eq!(threads.most.into_inner(), parts.min(MOST_PARTS), "{name}");
@@ -209,7 +185,7 @@ fn any_number_of_parts_gives_the_same_bits() {
 #[test]
 fn threads_of_rayon_give_the_same_bits() {
     let body = body();
-    let one = Backwards { parts: 1, most: AtomicUsize::new(0) };
+    let one = Backwards::new(1);
     let (exact_bits, learned_bits) = (exact(&body, &one), learned(&body, &one));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     for parts in [1, 2, 3, 8] {
@@ -230,7 +206,7 @@ fn forces_are_those_of_the_reference_in_any_order_of_nodes() {
         let mut state = displaced(&scene, &displacements);
         let loads = Loads::new(&scene, [0.0; 3], &[], &[]).unwrap();
         let step = Step::unchecked(1e-6, 0.0).unwrap();
-        let threads = Backwards { parts: 3, most: AtomicUsize::new(0) };
+        let threads = Backwards::new(3);
         let _ = tled::step_in_parts(scene.view(), &loads, state.view(), &step, &threads);
         let forces: Vec<_> = support::to_f64(state.forces()).iter().map(|f| f.map(|f| -f)).collect();
         let off = largest_distance(&forces, &expected) / largest(&expected);

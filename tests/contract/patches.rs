@@ -1,9 +1,9 @@
 //! Memory for the patches of tetrahedra with nodal strain: of a fixed capacity, of the caller, on the heap the same
 //! bits; too little is told with what is enough.
 
-use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
+use supple::element::{ElementTile, NodeInertia, PatchRow};
 use supple::loads::Loads;
-use supple::material::{AnyLaw, Material, NeoHookean, NodalStrain, Tissue};
+use supple::material::{AnyLaw, NeoHookean, NodalStrain, Tissue, VecMaterial};
 use supple::scene::{BuildError, FixedScene, SceneFacts, SceneView, VecScene, patch_rows_for, tiles_for};
 use supple::state::{AsState, FixedState, VecState};
 use supple::step::{CriticalStep, Status, Step};
@@ -12,7 +12,7 @@ use supple::tled;
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::nodal_strain::forces as exact_forces;
 use crate::support::bodies::{held, small_bar};
-use crate::support::{Body, NEO, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened};
+use crate::support::{Body, NEO, at_run_time, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened};
 
 /// Three tissues mixed at random, some of whose elements around a node share no face.
 fn three_tissues(body: &Body) -> ([Tissue<AnyLaw>; 3], Vec<u16>) {
@@ -21,7 +21,7 @@ fn three_tissues(body: &Body) -> ([Tissue<AnyLaw>; 3], Vec<u16>) {
 }
 
 /// Energy, critical step and bits of displacements after some steps.
-fn moved<M: ElementMaterial>(scene: SceneView<'_, M>, mut state: impl AsState) -> (f64, CriticalStep, Vec<[u32; 3]>) {
+fn moved(scene: SceneView<'_, VecMaterial>, mut state: impl AsState) -> (f64, CriticalStep, Vec<[u32; 3]>) {
     let loads = Loads::new(&scene, [1.0, 0.0, -9.81], &[], &[]).unwrap();
     let critical = tled::critical_step(&scene, &mut state).unwrap();
     let step = Step::new(0.5 * critical.seconds, 5.0, critical).unwrap();
@@ -42,11 +42,11 @@ fn any_memory_gives_the_same_bits() {
     assert_eq!((body.points.len(), body.tets.len()), (96, 270));
     let (tissues, of_element) = three_tissues(&body);
     let values = tissues.map(|tissue| tissue.values());
-    let material = NodalStrain(regions(NEO, &values, &of_element));
-    let on_heap = body.scene(material, &held(&body));
+    let material = at_run_time(&NodalStrain(regions(NEO, &values, &of_element)));
+    let on_heap = VecScene::build(material.clone(), &body.mesh(), &held(&body)).unwrap();
     let expected = moved(on_heap.view(), rest_of(&on_heap));
 
-    let mut fixed = FixedScene::<_, 100, 20, ROWS>::new(material);
+    let mut fixed = FixedScene::<_, 100, 20, ROWS>::new(material.clone());
     fixed.build(&body.mesh(), &held(&body)).unwrap();
     assert_eq!(fixed.patch_row_count(), on_heap.patch_row_count());
     assert!(moved(fixed.view(), FixedState::<100, 100>::new()) == expected);
@@ -62,17 +62,7 @@ fn any_memory_gives_the_same_bits() {
     assert_eq!(size_of::<FixedScene<(), 100, 20, ROWS>>() - size_of::<FixedScene<(), 100, 20>>(), 320 * ROWS);
 }
 
-/// A program that knows its law when it is compiled moves its scene as one that chooses it at run time does.
-#[test]
-fn a_typed_law_gives_the_same_bits() {
-    let body = small_bar();
-    let typed = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
-    let scene = VecScene::build(typed, &body.mesh(), &held(&body)).unwrap();
-    let chosen = body.scene(typed, &held(&body));
-    assert!(moved(scene.view(), rest_of(&scene)) == moved(chosen.view(), rest_of(&chosen)));
-}
-
-fn built<M: Material>(material: &M, body: &Body, rows: usize) -> Result<SceneFacts, BuildError> {
+fn built(material: &VecMaterial, body: &Body, rows: usize) -> Result<SceneFacts, BuildError> {
     let mut nodes = vec![NodeInertia::EMPTY; body.points.len()];
     let mut tiles = vec![ElementTile::EMPTY; tiles_for(body.tets.len())];
     let mut rows = vec![PatchRow::EMPTY; rows];
@@ -81,7 +71,7 @@ fn built<M: Material>(material: &M, body: &Body, rows: usize) -> Result<SceneFac
 
 /// Rows that are needed, and rows that are then in use. With fewer the error tells of enough, from some capacity on
 /// exactly; `most` rows are enough where not even nodes can be counted.
-fn rows_needed<M: Material>(material: &M, body: &Body, most: usize) -> (usize, usize) {
+fn rows_needed(material: &VecMaterial, body: &Body, most: usize) -> (usize, usize) {
     let mut last = 0;
     for capacity in 0.. {
         match built(material, body, capacity) {
@@ -110,13 +100,13 @@ fn too_little_room_tells_how_much_is_enough() {
         assert!(needed <= bound && taken <= needed);
     };
     let most = bound(&body, 1);
-    print("one tissue", rows_needed(&NodalStrain(tissues[0]), &body, most), most);
+    print("one tissue", rows_needed(&at_run_time(&NodalStrain(tissues[0])), &body, most), most);
     let values = tissues.map(|tissue| tissue.values());
     let regions = regions(NEO, &values, &of_element);
     let most = bound(&body, 3);
-    print("three tissues", rows_needed(&NodalStrain(regions), &body, most), most);
+    print("three tissues", rows_needed(&at_run_time(&NodalStrain(regions)), &body, most), most);
     for body in [Body::slivers([0.04, 0.04, 0.04]), Body::lobe(), Body::cylinder()] {
-        let facts = built(&NodalStrain(tissues[0]), &body, bound(&body, 1)).expect("enough");
+        let facts = built(&at_run_time(&NodalStrain(tissues[0])), &body, bound(&body, 1)).expect("enough");
         println!("{} elements: {} rows in use", body.tets.len(), facts.patch_row_count());
     }
 }
@@ -132,7 +122,7 @@ fn a_node_with_many_neighbours_is_no_obstacle() {
         body.tets.push([0, 3 * number + 2, 3 * number + 1, 3 * number + 3]);
     }
     let usual = patch_rows_for(601, 200, 1);
-    let (needed, taken) = rows_needed(&NodalStrain(tissue(NEO)), &body, usual);
+    let (needed, taken) = rows_needed(&at_run_time(&NodalStrain(tissue(NEO))), &body, usual);
     assert!(taken > 600 && needed > usual);
     let scene = body.scene(NodalStrain(tissue(NEO)), &[]);
     assert_eq!(scene.patch_row_count(), taken);

@@ -1,7 +1,5 @@
 //! To rest (`supple::tled::settle`) and from displacements of the host's: judged by a long damped motion of exact steps.
 
-use std::sync::atomic::AtomicUsize;
-
 use supple::contact::{Instrument, Pose, Shape};
 use supple::inertia::{self, Cells};
 use supple::loads::{Motion, NodalForce};
@@ -14,8 +12,7 @@ use supple::state::NodeVector;
 use supple::step::{MOST_PARTS, Status};
 use supple::tled::{self, DisplacementError, SettleError};
 
-use crate::contract::parts::Backwards;
-use crate::support::{Body, NEO, bits};
+use crate::support::{Backwards, Body, NEO, bits};
 
 const ELEMENTS: [Element; 3] = [Element::Linear, Element::NodalPressure, Element::NodalStrain];
 /// m/s^2: the bar bends by a tenth of its length.
@@ -309,7 +306,7 @@ fn threads_change_no_bit() {
             let surface = boundary(body.tets.iter().copied());
             let pressure = SurfacePressure::new(200.0, 0.0);
             simulation.pressures.press(&body.points, &surface, pressure).unwrap();
-            let threads = Backwards { parts, most: AtomicUsize::new(0) };
+            let threads = Backwards::new(parts);
             let settled = simulation.settle_in_parts(TOLERANCE, 60, &threads).unwrap();
             simulation.advance_in_parts(0.01, &threads).unwrap();
             (bits(simulation.state()), settled.steps, settled.remaining.to_bits(), threads.most.into_inner())

@@ -328,8 +328,8 @@ fn a_state_goes_on_in_a_second_scene() {
     let (points, tets): (Vec<_>, Vec<_>) = (SMALL.points().collect(), SMALL.tets().collect());
     let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
     let supports: Vec<_> = (0..9).map(Support::fixed).collect();
-    let tissue = supple::material::Tissue { law: SOFT, density: DENSITY };
-    let mut scene = FixedScene::<_, NODES, TILES>::new(tissue);
+    let tissue = VecMaterial::one(Element::Linear, SOFT, DENSITY);
+    let mut scene = FixedScene::<_, NODES, TILES>::new(tissue.clone());
     scene.build(&mesh, &supports).unwrap();
     let mut state = FixedState::<NODES>::new();
     let critical = tled::critical_step(&scene, &mut state).unwrap();

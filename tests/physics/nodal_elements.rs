@@ -7,14 +7,14 @@ use supple::loads::Loads;
 use supple::material::NeoHookean;
 use supple::scene::{Support, VecScene};
 use supple::state::VecState;
-use supple::step::{Status, Step, Threads};
+use supple::step::{Status, Step};
 use supple::tled;
 
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::tensor::{product, rotation};
 use crate::reference::{Law, Mat3, Random};
 use crate::support::bodies::{held, small_bar};
-use crate::support::{Body, bits, displaced, fixed, forces, norm, reference_law, rest_of, widened};
+use crate::support::{Backwards, Body, bits, displaced, fixed, forces, norm, reference_law, rest_of, widened};
 use crate::{reference, support};
 
 /// Of nodes in float64: displacements (m) or forces (N).
@@ -273,19 +273,10 @@ pub(crate) fn same_bits_in_parts_from<M: ElementMaterial>(
 }
 
 fn after_fifty_steps<M: ElementMaterial>(scene: &VecScene<M>, state: &VecState, step: &Step, parts: usize) -> Vec<u64> {
-    struct Parts(usize);
-    impl Threads for Parts {
-        fn parts(&self) -> usize {
-            self.0
-        }
-        fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync) {
-            std::thread::scope(|scope| parts.iter_mut().for_each(|part| drop(scope.spawn(|| work(part)))));
-        }
-    }
     let mut state = state.clone();
     let loads = Loads::new(scene, [3.0, 0.0, -9.81], &[], &[]).unwrap();
     for _ in 0..50 {
-        let status = tled::step_in_parts(scene.view(), &loads, state.view(), step, &Parts(parts));
+        let status = tled::step_in_parts(scene.view(), &loads, state.view(), step, &Backwards::new(parts));
         assert!(status.is_taken(), "{status:?}");
     }
     bits(&state)

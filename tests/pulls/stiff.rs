@@ -1,6 +1,6 @@
 use super::*;
 
-use supple::step::Threads;
+use crate::support::Backwards;
 
 /// Points of the free bar that is turned, bent, stretched and measured with an error are drawn there from rest: of each
 /// element 10 times with other points, stiffnesses of 10 to 1e6 N/m, with exact steps and with long ones.
@@ -113,24 +113,6 @@ fn points_follow_moving_targets_of_which_a_third_is_missing() {
     }
 }
 
-/// Each part on a thread of its own.
-struct Three;
-
-impl Threads for Three {
-    fn parts(&self) -> usize {
-        3
-    }
-
-    fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync) {
-        let work = &work;
-        std::thread::scope(|scope| {
-            for part in parts {
-                scope.spawn(move || work(part));
-            }
-        });
-    }
-}
-
 #[test]
 fn threads_change_no_bit() {
     for method in [Method::Exact, long()] {
@@ -141,7 +123,7 @@ fn threads_change_no_bit() {
                 let pull = body.pull(at, 0.015, 1000.0).unwrap();
                 body.pulls[pull].put([at[0] + 0.01, at[1], at[2] - 0.003]);
             }
-            let report = if threads { body.advance_in_parts(0.1, &Three) } else { body.advance(0.1) };
+            let report = if threads { body.advance_in_parts(0.1, &Backwards::new(3)) } else { body.advance(0.1) };
             (body.displacements().to_vec(), body.state().pull_forces().to_vec(), report.unwrap().status)
         };
         let alone = moved(false);

@@ -10,6 +10,7 @@ pub mod sums;
 
 mod levels;
 mod targets;
+mod typed;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

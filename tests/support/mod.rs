@@ -5,8 +5,10 @@
 #![allow(dead_code, unreachable_pub, unused_imports, unused_macros)]
 
 pub mod bodies;
+mod threads;
 
 pub use bodies::Body;
+pub use threads::Backwards;
 
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
