@@ -26,7 +26,7 @@ lab() { "$supple-lab" "$@" --out out/report/lab 2>/dev/null | tail -n 2; }
 lab methods --scene reversed --scene cylinder --multiple 10 --multiple 20 \
     --method tled --method hold --method long --method compact-f32
 lab physics --scene torsion
-lab hard --scene slivers --scene release-stretched --random 4 --method long --method compact-f32
+lab hard --scene slivers --scene release-stretched --random 4 --presses 2 --ordinary 2 --method long --method compact-f32
 # Each part is there still after the others.
 for title in 'Speed against error' 'Error against nature' 'Hard cases'; do
     grep -q "<h2>$title" out/report/lab/report.html || { echo "failed: no part '$title'" >&2; exit 1; }

@@ -131,6 +131,8 @@ impl LargeModel {
 
     /// Computes all inertia, with coarser lattices as long as single precision cannot invert the matrices of a suggested
     /// one. Bodies that share no node are set apart ([`Layout`]) where there is room for that.
+    // Not inlined: other crates use the one that is compiled here.
+    #[inline(never)]
     fn first_cycles<M: ElementMaterial>(
         &mut self,
         mut grid: Grid,

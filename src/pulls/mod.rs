@@ -241,6 +241,8 @@ impl Pull {
 /// the gradient between them: a patch at a thin edge hangs on less of it than its volume tells. Twice as much crushes elements there
 /// where points with errors come and go. Looks at every element; faster for nodes in order. Infinite without tissue there.
 #[must_use]
+// Not inlined: other crates use the one that is compiled here.
+#[inline(never)]
 pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
     let is_sorted = nodes.is_sorted_by_key(|pulled| pulled.node);
     let is_pulled = |node: u32| match is_sorted {

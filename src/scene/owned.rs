@@ -148,6 +148,8 @@ pub type VecScene<M> = Scene<M, VecTables>;
 #[cfg(any(feature = "std", test))]
 impl<M: Material> VecScene<M> {
     /// Builds a scene from a mesh, what it is made of, and its supports; a node may be listed more than once.
+    // Not inlined: other crates use the one that is compiled here.
+    #[inline(never)]
     pub fn build(material: M, mesh: &Mesh<'_>, supports: &[Support]) -> Result<Self, BuildError> {
         let mut nodes = std::vec![NodeInertia::EMPTY; mesh.points().len()];
         let mut tiles = std::vec![ElementTile::EMPTY; tiles_for(mesh.element_count())];

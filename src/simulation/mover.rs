@@ -112,6 +112,8 @@ impl Mover<'_, '_> {
     /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the
     /// report has the status; or until the work is spent, which the status says. `watch` is shown each step.
     #[allow(clippy::too_many_arguments)]
+    // Not inlined: other crates use the one that is compiled here.
+    #[inline(never)]
     pub fn advance<M: ElementMaterial>(
         self,
         until: f64,

@@ -154,6 +154,8 @@ pub(crate) trait StepMethod<M> {
 
 impl<'a, M: ElementMaterial> Trial<'a, M> {
     /// Borrows what a step needs; `room` is that of the method's own storage, in nodes.
+    // Not inlined: other crates use the one that is compiled here.
+    #[inline(never)]
     pub(crate) fn begin(
         scene: SceneView<'a, M>,
         loads: &'a Loads<'a>,
@@ -206,6 +208,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// Takes the step, or refuses it.
+    // Not inlined: other crates use the one that is compiled here.
+    #[inline(never)]
     pub(crate) fn take<C: StepMethod<M>>(mut self, step: &Step, method: &mut C) -> Status {
         if self.loads.contact().is_some() && !method.meets_instruments(&self) {
             let time = self.progress.time;

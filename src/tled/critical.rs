@@ -71,6 +71,8 @@ impl Weights<'_> {
 }
 
 /// See [`critical_step`].
+// Not inlined: other crates use the one that is compiled here.
+#[inline(never)]
 pub(super) fn critical<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     state: StateView<'_>,

@@ -151,6 +151,8 @@ pub fn settle(
 }
 
 /// The same, to the bit, on several threads of the host.
+// Not inlined: other crates use the one that is compiled here.
+#[inline(never)]
 pub fn settle_in_parts<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     loads: &mut impl LoadsOverTime,

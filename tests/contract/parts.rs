@@ -14,7 +14,9 @@ use supple::tled;
 
 use crate::networks::{Memory, described, uniform};
 use crate::support::bodies::{corner_torsion, held};
-use crate::support::{Backwards, Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened};
+use crate::support::{
+    Backwards, Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened,
+};
 use crate::{reference, support};
 
 const DT: f32 = 2e-5;

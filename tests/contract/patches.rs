@@ -12,7 +12,9 @@ use supple::tled;
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::nodal_strain::forces as exact_forces;
 use crate::support::bodies::{held, small_bar};
-use crate::support::{Body, NEO, at_run_time, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened};
+use crate::support::{
+    Body, NEO, at_run_time, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened,
+};
 
 /// Three tissues mixed at random, some of whose elements around a node share no face.
 fn three_tissues(body: &Body) -> ([Tissue<AnyLaw>; 3], Vec<u16>) {

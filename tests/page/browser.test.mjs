@@ -230,7 +230,7 @@ async function shake(page, method) {
                         if (now.exact) exact.push(now.exact.milliseconds);
                     }
                     const seconds = (performance.now() - begin) / 1000;
-                    if (seconds < 4) setTimeout(look, 1);
+                    if (seconds < 2) setTimeout(look, 1);
                     else
                         done({
                             times,
@@ -244,7 +244,7 @@ async function shake(page, method) {
                 look();
             }),
     );
-    for (let part = 0; part < 100; part++) {
+    for (let part = 0; part < 50; part++) {
         await page.mouse.move(from.x + 12 * Math.sin(part / 12), from.y - 12 + 12 * Math.cos(part / 12));
         await pause(35);
     }
