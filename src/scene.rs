@@ -145,8 +145,6 @@ impl SceneFacts {
         Ok(facts)
     }
 
-    // Not inlined: other crates use the one that is compiled here.
-    #[inline(never)]
     fn build_patches(
         &mut self,
         material: &impl Material,
@@ -172,8 +170,6 @@ impl SceneFacts {
         if families > 0 && needed > capacity { Err(BuildError::FibreCapacity { needed, capacity }) } else { Ok(()) }
     }
 
-    // Not inlined: other crates use the one that is compiled here.
-    #[inline(never)]
     fn without_patches<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
