@@ -11,6 +11,7 @@ mod refused;
 mod restored;
 mod rough_motion;
 mod rounding;
+mod short_calls;
 mod switching;
 mod turning;
 mod wild;
