@@ -2,6 +2,7 @@
 //! refused.
 
 mod closed_forms;
+mod first_steps;
 mod hostile;
 mod late;
 mod stiff;
