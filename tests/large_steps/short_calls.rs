@@ -1,4 +1,4 @@
-//! Calls far shorter than the long steps that are taken unless a length is given, 20 times the critical one: a block
+//! Calls far shorter than the long steps that are taken unless a length is given, 20 times the critical one: a slab
 //! that is fixed below and pushed sideways at its top goes as exact steps take it. With the inertia of the longer steps
 //! it hardly moved.
 
@@ -15,13 +15,13 @@ use crate::support::{mean_distance, to_f64};
 /// What is called right, m: half of the tolerance that holds unless one is given.
 const RIGHT: f64 = 2.5e-4;
 
-/// A block with a square base of so many metres.
-struct Block {
+/// A slab with a square base of so many metres.
+struct Slab {
     edge: f32,
     young: f32,
 }
 
-impl Block {
+impl Slab {
     fn pushed(&self, method: Method<'static>) -> Simulation<'static> {
         let bar = Bar { size: [self.edge, self.edge, 0.5 * self.edge], cells: [8, 8, 4] };
         let (shear, bulk) = (self.young / 2.9, self.young / 0.3);
@@ -37,11 +37,11 @@ impl Block {
 }
 
 #[test]
-fn a_block_moves_in_short_calls_as_exact_steps_take_it() {
+fn a_slab_moves_in_short_calls_as_exact_steps_take_it() {
     for (edge, young, call) in [(0.4, 3000.0, 1.0 / 60.0), (0.25, 1000.0, 1.0 / 60.0), (0.1, 3000.0, 0.005)] {
-        let block = Block { edge, young };
+        let slab = Slab { edge, young };
         let (mut exact, mut long) =
-            (block.pushed(Method::Exact), block.pushed(Method::Long(Lattice::new(Cells::Suggested))));
+            (slab.pushed(Method::Exact), slab.pushed(Method::Long(Lattice::new(Cells::Suggested))));
         let (mut worst, mut motion, mut needless) = (0.0_f64, 0.0_f64, 0);
         let calls = (0.6 / call) as u32;
         for _ in 0..calls {
