@@ -2,29 +2,23 @@
 
 use std::fmt::Write as _;
 
-use supple::points::VecPoints;
+use supple::points::{FollowedPoint, VecPoints};
 
 use crate::problem::Problem;
 use crate::scene::points::ScenePoints;
 use supple::state::VecState;
 
-/// The points, where they are at rest, and at each frame the time, s, and where they are then, m from the centre of the body.
+/// The points, and of each frame its time, s, and where they are, m from the centre of the body.
 #[derive(Default)]
 pub(crate) struct FollowedPoints {
     names: Vec<String>,
     points: Option<VecPoints>,
-    rest: Vec<[f32; 3]>,
     rows: Vec<(f64, Vec<[f32; 3]>)>,
 }
 
 impl FollowedPoints {
-    pub(crate) fn new(of: &ScenePoints, nodes: usize) -> Result<Self, Problem> {
-        let mut points = of.followed.clone();
-        if let Some(points) = &mut points {
-            points.follow(&mut VecState::at_rest(nodes)).map_err(Problem::of)?;
-        }
-        let rest = points.as_ref().map_or(vec![], |points| points.positions().to_vec());
-        Ok(Self { names: of.names.clone(), points, rest, rows: vec![] })
+    pub(crate) fn new(of: &ScenePoints) -> Self {
+        Self { names: of.names.clone(), points: of.followed.clone(), rows: vec![] }
     }
 
     /// Takes down a frame.
@@ -37,11 +31,13 @@ impl FollowedPoints {
 
     /// Of each point its name, and at each frame the time, s, and how far it has moved from where it was at rest, m.
     pub(crate) fn moved(&self) -> Vec<(&str, Vec<(f64, f64)>)> {
+        let Some(points) = self.points.as_ref().filter(|_| !self.rows.is_empty()) else { return vec![] };
         let way =
             |a: [f32; 3], b: [f32; 3]| (0..3).map(|axis| f64::from(b[axis] - a[axis]).powi(2)).sum::<f64>().sqrt();
-        let of =
-            |index: usize| self.rows.iter().map(move |(time, at)| (*time, way(self.rest[index], at[index]))).collect();
-        self.names.iter().map(String::as_str).zip((0..self.rest.len()).map(of)).collect()
+        let of = |(index, point): (usize, &FollowedPoint)| {
+            self.rows.iter().map(|(time, at)| (*time, way(point.rest, at[index]))).collect()
+        };
+        self.names.iter().map(String::as_str).zip(points.points().iter().enumerate().map(of)).collect()
     }
 
     /// `points.csv`, in the coordinates of the mesh.

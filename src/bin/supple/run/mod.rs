@@ -88,7 +88,7 @@ impl<'a> Running<'a> {
     pub(crate) fn begin(setup: &'a Setup, start: Start<'a>, tick: &'a dyn Fn(f64)) -> Result<Self, Problem> {
         let Start { at_rest, step, simulation } = start;
         let mut outcome = Outcome::new(at_rest, step.seconds());
-        outcome.points = FollowedPoints::new(&setup.points, simulation.scene().node_count())?;
+        outcome.points = FollowedPoints::new(&setup.points);
         outcome.reactions = Reactions::new(setup.instruments.all.len(), &setup.time);
         outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
         outcome.learned = simulation.learned_step().map(LearnedTrace::new);
